@@ -1,6 +1,10 @@
 // The system for the increment of k: the equations of the block. Twin of crates/flow/src/scheme/curvature.rs.
 
 fn curvature_equation() {
+    if CRYSTAL {
+        curvature_of_crystal();
+        return;
+    }
     let wk = k_window;
     let k = here(wk);
     let irm = minus1(ir);
@@ -25,4 +29,32 @@ fn curvature_equation() {
     let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
     normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
     rhs_x = (forcing + rkb * k - stiff) * inverse;
+}
+
+/// The equations of a crystal: the stiff terms are those of w = g k, with M at the nodes.
+fn curvature_of_crystal() {
+    let k = here(k_window);
+    let by_k = offsets(k_window);
+    let by = offsets(weighted);
+    let through = conductance();
+    let irm = minus1(ir);
+    let irh = here(ir);
+    let irp = plus1(ir);
+    let iqm = minus1(iq);
+    let iqh = here(iq);
+    let before = real(0.5) * alpha_before;
+    let after = real(0.5) * alpha;
+    let row_a = iqm * irm * through.minus2;
+    let row_e = iqh * irp * through.plus1;
+    let row_b = -(through.minus1 * (irh * iqh + iqm * (irh + irm)) + row_a);
+    let row_d = -(through.here * (irh * iqm + iqh * (irh + irp)) + row_e);
+    let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
+    let rate = real(1.0) / tau;
+    let row_c = (here(r_new) * rate - rkb) - (before - after) - (row_a + row_b + row_d + row_e) * here(stiffness);
+    let rhs = rkb * k - stiff - (before * by_k.minus1 - after * by_k.plus1);
+    normalise(
+        row_a * minus2(stiffness), row_b * minus1(stiffness) + before, row_c, row_d * plus1(stiffness) - after,
+        row_e * plus2(stiffness), tau * irh,
+    );
+    rhs_x = rhs * inverse;
 }

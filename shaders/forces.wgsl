@@ -1,8 +1,15 @@
 // The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without division;
-// the density of the energy. Twin of crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
+// the density of the energy; g = gamma + gamma'' and M of a crystal by powers of the tangent. Twin of crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
 
 /// The place of the length penalty in the law, after the coefficients.
 const LENGTH_PENALTY = 8u;
+/// The places of the waves of a crystal: of its energy, and of its mobility; their number, and the numbers of one.
+const ENERGY_WAVES = 9u;
+const DIFFUSIVITY_WAVES = 15u;
+const MOST_WAVES = 2u;
+const WAVE = 3u;
+/// The place of the factor by which its surface energy is reported.
+const ENERGY_UNIT = 21u;
 
 struct Law { c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: real, c8: real }
 
@@ -34,11 +41,192 @@ fn b_over_k(curvature: vec) -> vec {
     return sum * curvature + vec(law.c1);
 }
 
+/// Complex numbers.
+struct Complex { x: vec, y: vec }
+
+/// What gamma + gamma'' and M are on segments, in the direction of their unit tangents, less 1; and the powers that they come
+/// from.
+struct Directed {
+    stiffness: vec,
+    diffusivity: vec,
+    energy_powers: array<Complex, MOST_WAVES>,
+    diffusivity_powers: array<Complex, MOST_WAVES>,
+}
+
+/// The same at the nodes between two segments.
+struct Between { stiffness: vec, diffusivity: vec }
+
+/// m of a wave of the function whose waves begin at `place`; 0: there is none.
+fn mode_of(place: u32, wave: u32) -> u32 {
+    return u32(all_parameters[member].law[place + wave * WAVE]);
+}
+
+fn directed(tangent: Complex) -> Directed {
+    var all = Directed();
+    for (var i = 0u; i < MOST_WAVES; i++) {
+        let mode = mode_of(ENERGY_WAVES, i);
+        if mode != 0u {
+            let z = power(tangent, mode);
+            all.energy_powers[i] = z;
+            all.stiffness += stiffening(mode) * part(ENERGY_WAVES, i, z);
+        }
+        let other = mode_of(DIFFUSIVITY_WAVES, i);
+        if other != 0u {
+            let z = power(tangent, other);
+            all.diffusivity_powers[i] = z;
+            all.diffusivity += part(DIFFUSIVITY_WAVES, i, z);
+        }
+    }
+    return all;
+}
+
+/// gamma + gamma'' and M in the direction that halves the angle between two tangents.
+fn between(earlier: Directed, later: Directed) -> Between {
+    // Parameters can only be indexed by constants.
+    var ahead = earlier;
+    var behind = later;
+    var all = Between(vec(1.0), vec(1.0));
+    for (var i = 0u; i < MOST_WAVES; i++) {
+        let mode = mode_of(ENERGY_WAVES, i);
+        if mode != 0u {
+            let z = halfway(ahead.energy_powers[i], behind.energy_powers[i]);
+            all.stiffness += stiffening(mode) * part(ENERGY_WAVES, i, z);
+        }
+        if mode_of(DIFFUSIVITY_WAVES, i) != 0u {
+            let z = halfway(ahead.diffusivity_powers[i], behind.diffusivity_powers[i]);
+            all.diffusivity += part(DIFFUSIVITY_WAVES, i, z);
+        }
+    }
+    return all;
+}
+
+/// gamma, gamma' and gamma + gamma'' in the direction of unit tangents.
+struct Tension { energy: vec, turned: vec, stiffness: vec }
+
+fn tension(tangent: Complex) -> Tension {
+    var all = Tension(vec(1.0), vec(0.0), vec(1.0));
+    for (var i = 0u; i < MOST_WAVES; i++) {
+        let mode = mode_of(ENERGY_WAVES, i);
+        if mode != 0u {
+            let z = power(tangent, mode);
+            let at = ENERGY_WAVES + i * WAVE;
+            let a = all_parameters[member].law[at + 1u];
+            let b = all_parameters[member].law[at + 2u];
+            let wave = part(ENERGY_WAVES, i, z);
+            all.energy += wave;
+            all.turned += real(mode) * (b * z.x - a * z.y);
+            all.stiffness += stiffening(mode) * wave;
+        }
+    }
+    return all;
+}
+
+/// `1 - m^2`, the factor of a wave in gamma + gamma''.
+fn stiffening(mode: u32) -> real {
+    let m = real(mode);
+    return real(1.0) - m * m;
+}
+
+/// `a Re z + b Im z`.
+fn part(place: u32, wave: u32, z: Complex) -> vec {
+    let at = place + wave * WAVE;
+    return all_parameters[member].law[at + 1u] * z.x + all_parameters[member].law[at + 2u] * z.y;
+}
+
+/// `z^m` of complex numbers, m >= 1, by squaring.
+fn power(z: Complex, mode: u32) -> Complex {
+    var re = z.x;
+    var im = z.y;
+    var bit = firstLeadingBit(mode);
+    while bit > 0u {
+        bit -= 1u;
+        let twice = re * im;
+        re = (re - im) * (re + im);
+        im = twice + twice;
+        if ((mode >> bit) & 1u) != 0u {
+            let next = re * z.x - im * z.y;
+            im = re * z.y + im * z.x;
+            re = next;
+        }
+    }
+    return Complex(re, im);
+}
+
+/// The unit numbers halfway between two, along the circle.
+fn halfway(a: Complex, b: Complex) -> Complex {
+    let dx = b.x - a.x;
+    let dy = b.y - a.y;
+    let share = real(0.5) + real(0.0625) * (dx * dx + dy * dy);
+    return Complex(share * (a.x + b.x), share * (a.y + b.y));
+}
+
+/// The unit tangents of edges.
+fn tangent_of(given: Edge) -> Complex {
+    let inverse = vec(1.0) / given.length;
+    return Complex(given.x * inverse, given.y * inverse);
+}
+
+/// g and w = g k on the segments of the old polygon, and M at its nodes, for the curvatures of a crystal.
+var<private> stiffness: Window;
+var<private> weighted: Window;
+var<private> mobile_there: Window;
+
+fn fill_directions(k: vec) {
+    settle();
+    let old = windows(load_field(curve), load_field(curve + 1u));
+    let x = rises_of_places(old.a);
+    let y = rises_of_places(old.b);
+    let own = directed(tangent_of(edge(x.here, y.here)));
+    let there = between(own, directed(tangent_of(edge(x.plus1, y.plus1))));
+    let g = vec(1.0) + own.stiffness;
+    settle();
+    let exchanged = windows(g, g * k);
+    stiffness = exchanged.a;
+    weighted = exchanged.b;
+    settle();
+    mobile_there = lone_window(there.diffusivity);
+}
+
 /// beta for the old curvatures, with their window `wk`.
 fn velocity(k: vec, wk: Window) -> vec {
+    if CRYSTAL {
+        fill_directions(k);
+        let through = conductance();
+        let rise = rises(weighted);
+        return (rise.here * through.minus1 - rise.plus1 * through.here) * here(ir);
+    }
     read_law();
     let rise = rises(wk);
     return b(k) - (rise.plus1 * here(iq) - rise.here * minus1(iq)) * here(ir);
+}
+
+/// M/q at the nodes i-2 ... i+1 of a crystal.
+struct Conductance { minus2: vec, minus1: vec, here: vec, plus1: vec }
+
+fn conductance() -> Conductance {
+    return Conductance(
+        minus2(mobile_there) * minus2(iq), minus1(mobile_there) * minus1(iq), here(mobile_there) * here(iq),
+        plus1(mobile_there) * plus1(iq),
+    );
+}
+
+/// What the position equation of a crystal needs: g and M on the segments i and i+1, at the nodes i-1, i and i+1.
+struct Directions {
+    stiffness: vec, stiffness_after: vec, mobile: vec, mobile_after: vec,
+    before: Between, there: Between, after: Between,
+}
+
+fn directions(wx: Window, wy: Window) -> Directions {
+    let x = rises_of_places(wx);
+    let y = rises_of_places(wy);
+    let before = directed(tangent_of(edge(x.minus1, y.minus1)));
+    let own = directed(tangent_of(edge(x.here, y.here)));
+    let next = directed(tangent_of(edge(x.plus1, y.plus1)));
+    let last = directed(tangent_of(edge(x.plus2, y.plus2)));
+    return Directions(
+        vec(1.0) + own.stiffness, vec(1.0) + next.stiffness, vec(1.0) + own.diffusivity, vec(1.0) + next.diffusivity,
+        between(before, own), between(own, next), between(next, last),
+    );
 }
 
 /// The curvature at the node between two edges: `2 sin(θ/2)` of the angle θ there over half the length of both.
@@ -49,18 +237,30 @@ fn bent(before: Edge, after: Edge) -> vec {
 struct Force { x: vec, y: vec }
 
 /// `q (βN + αT)` at the nodes of the old polygon: the second difference of its own curvature and b along the inward
-/// normal to the chord between the neighbours, and alpha along the chord.
-fn of_polygon(wx: Window, wy: Window) -> Force {
+/// normal to the chord between the neighbours, and alpha along the chord. Of a crystal, g times that curvature, and M.
+fn of_polygon(wx: Window, wy: Window, given: Directions) -> Force {
     let x = rises_of_places(wx);
     let y = rises_of_places(wy);
     let e = edge(x.here, y.here);
     let f = edge(x.plus1, y.plus1);
-    let own = bent(e, f);
-    let rise = own - bent(edge(x.minus1, y.minus1), e);
-    let next = bent(f, edge(x.plus2, y.plus2)) - own;
+    var before = bent(edge(x.minus1, y.minus1), e);
+    var own = bent(e, f);
+    var after = bent(f, edge(x.plus2, y.plus2));
+    if CRYSTAL {
+        before = given.before.stiffness * before;
+        own = given.there.stiffness * own;
+        after = given.after.stiffness * after;
+    }
+    let rise = own - before;
+    let next = after - own;
     let along_x = e.x + f.x;
     let along_y = e.y + f.y;
-    let inward = real(0.5) * (e.length + f.length) * b(own) - (next / f.length - rise / e.length);
+    var inward = vec(0.0);
+    if CRYSTAL {
+        inward = given.mobile * (rise / e.length) - given.mobile_after * (next / f.length);
+    } else {
+        inward = real(0.5) * (e.length + f.length) * b(own) - (next / f.length - rise / e.length);
+    }
     let across = inward / sqrt(along_x * along_x + along_y * along_y);
     let sliding = real(0.5) * alpha;
     return Force(sliding * along_x - across * along_y, sliding * along_y + across * along_x);

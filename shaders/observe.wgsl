@@ -13,12 +13,24 @@ const NEAR = 4.0;
 /// The place of 4π, or 4|W|, in the law.
 const QUOTIENT = 22u;
 
-/// Sums of the new curve: length, area, energy, turning.
+/// Sums of the new curve: length, area, energy, turning. Of a crystal, in place of the energy the sum of gamma |e|.
 var<private> sums: vec;
 /// Maxima of the new curve: |k| r, metric drift, longest edge, minus the shortest edge.
 var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
+
+/// What the excess compares with the area: the length, of a crystal its surface energy.
+fn total_tension() -> real {
+    if CRYSTAL { return sums.z; }
+    return sums.x;
+}
+
+/// The energy that is reported.
+fn energy_of_sums() -> real {
+    if CRYSTAL { return all_parameters[member].law[ENERGY_UNIT] * sums.z; }
+    return sums.z;
+}
 
 /// How far the nodes of the new curve have moved.
 var<private> displacement: vec;
@@ -75,8 +87,17 @@ fn decline() -> vec2<real> {
     let gx = rises(bend.a).here;
     let gy = rises(bend.b).here;
     let inverse = vec(1.0) / sqrt(ex * ex + ey * ey);
-    let stretch = (ex * fx + ey * fy) * inverse;
-    let bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
+    var stretch = (ex * fx + ey * fy) * inverse;
+    var bent = (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse;
+    if CRYSTAL {
+        let tx = ex * inverse;
+        let ty = ey * inverse;
+        let given = tension(Complex(tx, ty));
+        let across = tx * fy - ty * fx;
+        stretch = given.energy * (tx * fx + ty * fy) + given.turned * across;
+        let pulled = given.energy * (tx * gx + ty * gy) + given.turned * (tx * gy - ty * gx);
+        bent = given.stiffness * (across * across) * inverse + pulled;
+    }
     let at = corner(new_x, new_y);
     let area = (minus1(slope.a) * at.y - here(slope.a) * at.before_y)
         + (at.before_x * here(slope.b) - at.x * minus1(slope.b));
@@ -85,7 +106,7 @@ fn decline() -> vec2<real> {
         + real(2.0) * (minus1(slope.a) * here(slope.b) - here(slope.a) * minus1(slope.b));
     let part = vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend));
     let all = ring_sums(part);
-    let length = sums.x;
+    let length = total_tension();
     let half = real(0.5);
     let growth = all.x / length;
     let widening = half * all.z / sums.y;
@@ -124,7 +145,12 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let own = edge(x.here, y.here).length;
     let at = corner(wx, wy);
     let cross = at.before_x * at.y - at.x * at.before_y;
-    let energy = energy_density(kh) * rh;
+    var energy = vec(0.0);
+    if CRYSTAL {
+        energy = tension(tangent_of(edge(x.here, y.here))).energy * own;
+    } else {
+        energy = energy_density(kh) * rh;
+    }
     let turning = winding(x.here, y.here, x.plus1, y.plus1);
     let part = vec(block_sum(own), block_sum(cross), block_sum(energy), block_sum(turning));
     let shortest = -bounded_abs(own);
@@ -145,7 +171,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
 /// Derives the observables from the last `observe`.
 fn observed() -> Observed {
     return Observed(
-        sums.x, sums.y, excess(sums.x, sums.y), sums.z, -others.y, others.x, extremes.z / -extremes.w, extremes.y,
+        sums.x, sums.y, excess(total_tension(), sums.y), energy_of_sums(), -others.y, others.x, extremes.z / -extremes.w, extremes.y,
     );
 }
 

@@ -1,6 +1,10 @@
 // The system for the increments of x and y: the equations of the block. Twin of crates/flow/src/scheme/position.rs.
 
 fn position_equation() {
+    if CRYSTAL {
+        position_of_crystal();
+        return;
+    }
     read_law();
     let wk = k_window;
     let kh = here(wk);
@@ -28,13 +32,52 @@ fn position_equation() {
     settle();
     let old = windows(load_field(curve), load_field(curve + 1u));
     if GEOMETRIC {
-        let force = of_polygon(old.a, old.b);
+        let force = of_polygon(old.a, old.b, Directions());
         rhs_x = force.x * inverse;
         rhs_y = force.y * inverse;
         return;
     }
     rhs_x = residual_of_old(row_a, row_b, row_d, row_e, old.a) * inverse;
     rhs_y = residual_of_old(row_a, row_b, row_d, row_e, old.b) * inverse;
+}
+
+/// The equations of a crystal, with `phi = M w k` and the drift `(M ∂w k + ∂(M w k))/2`.
+fn position_of_crystal() {
+    settle();
+    let old = windows(load_field(curve), load_field(curve + 1u));
+    let given = directions(old.a, old.b);
+    let wk = k_window;
+    let kh = here(wk);
+    let kp = plus1(wk);
+    let irm = minus1(ir);
+    let irh = here(ir);
+    let irp = plus1(ir);
+    let irpp = plus2(ir);
+    let before = given.before.stiffness * minus1(iq);
+    let at = given.there.stiffness * here(iq);
+    let after = given.after.stiffness * plus1(iq);
+    let w = given.stiffness * kh;
+    let wp = given.stiffness_after * kp;
+    let s = given.mobile * irh;
+    let sp = given.mobile_after * irp;
+    let phi_here = given.mobile * (w * kh);
+    let phi_after = given.mobile_after * (wp * kp);
+    let current = given.there.diffusivity * (wp - w);
+    let mean = real(0.5) * (phi_here + phi_after);
+    let turned = real(0.5) * ((kh + kp) * current) + (phi_after - phi_here);
+    let drift = real(0.5) * (alpha - turned * here(iq));
+    let both = at * (s + sp);
+    let row_a = s * irm * before;
+    let row_e = sp * irpp * after;
+    let row_b = (mean * irh + drift) - (irh * (both + s * before) + row_a);
+    let row_d = (mean * irp - drift) - (irp * (both + sp * after) + row_e);
+    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    let rate = real(1.0) / tau;
+    let row_c = q * rate - (row_a + row_b + row_d + row_e);
+    normalise(row_a, row_b, row_c, row_d, row_e, tau * here(iq));
+    let force = of_polygon(old.a, old.b, given);
+    rhs_x = force.x * inverse;
+    rhs_y = force.y * inverse;
 }
 
 fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {

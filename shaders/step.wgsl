@@ -21,6 +21,9 @@ fn forget() {
     r_new = Window();
     ir = Window();
     iq = Window();
+    stiffness = Window();
+    weighted = Window();
+    mobile_there = Window();
     rkb = vec();
     alpha = vec();
     alpha_before = vec();

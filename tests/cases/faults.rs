@@ -17,7 +17,7 @@ use curvelax::{
         cpu::{CpuBackend, Vectorised, Vectors},
         gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
-    conformance::{adaptive_members, members, self_test},
+    conformance::{Driven, adaptive_members, members, self_test},
     ensemble::{
         Cell, Ended, Family, Spec, Status,
         request::spec::{BackendChoice, Precision},
@@ -330,7 +330,8 @@ fn the_self_test_finds_a_liar<T: Vectorised>(solver: Solver, adaptive: bool) -> 
         // One member at a time, as those of the self-test could not run side by side.
         let inner = CpuBackend::<T>::with_vectors(Blocks::new(n).ok_or("n")?, method(solver), 1, Vectors::None)?;
         let mut liar = Liar { inner, lie };
-        let result = self_test::<T>(&mut liar, "toaster (bread 1.2)", false, &method(solver), n, adaptive, false);
+        let result =
+            self_test::<T>(&mut liar, "toaster (bread 1.2)", false, &method(solver), n, adaptive, Driven::Paper);
         // Its slots are free again.
         liar.start(0)?;
         liar.finish(0)?;
@@ -365,7 +366,7 @@ fn the_self_test_passes<T: Evolves>(
     started: Instant,
 ) -> Outcome {
     let (hardware, method) = (gpu.is_hardware(), method(solver));
-    let mut test = || self_test::<T>(kernel, gpu.name(), hardware, &method, POINTS, adaptive, false);
+    let mut test = || self_test::<T>(kernel, gpu.name(), hardware, &method, POINTS, adaptive, Driven::Paper);
     test()?;
     let first = started.elapsed();
     test()?;

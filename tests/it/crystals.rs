@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use curvelax::crystal::Energy;
+use curvelax::{crystal::Energy, ensemble::outcome::wulff_distance};
 use glam::DVec2;
 
 use crate::common::program::{Done, column, number, positions, run, run_with};
@@ -79,21 +79,6 @@ fn lengths_and_energies_of_ellipses_converge_to_those_of_a_spectral_program() {
     assert!(worst(&at_times(&ellipse("--form geometric", 100, 1.0, 0.01))[0], &ELLIPSES[2].1) > 2e-3);
 }
 
-/// The largest error of the support function of a polygon, centred, against the Wulff shape of its area.
-fn distance_from_wulff(nodes: &[DVec2], energy: &Energy) -> f64 {
-    let n = nodes.len();
-    let cross = |i: usize| nodes[i].perp_dot(nodes[(i + 1) % n]);
-    let area = 0.5 * (0..n).map(cross).sum::<f64>();
-    let centre = (0..n).map(|i| cross(i) * (nodes[i] + nodes[(i + 1) % n])).sum::<DVec2>() / (6.0 * area);
-    let scale = (area / energy.wulff_area()).sqrt();
-    let error = |i: usize| {
-        let psi = TAU * i as f64 / 360.0;
-        let support = nodes.iter().map(|node| (*node - centre).dot(DVec2::from_angle(psi))).fold(0.0, f64::max);
-        (support - scale * energy.waves().at(psi)[0]).abs()
-    };
-    (0..360).map(error).fold(0.0, f64::max)
-}
-
 #[test]
 fn an_ellipse_ends_as_the_wulff_shape_with_its_area_and_an_energy_that_never_rises() {
     for (text, n, bounds) in [("cos:2,0.1", [50, 100, 200], 3e-4), ("cos:4,0.03", [50, 100, 200], 3e-4)] {
@@ -106,7 +91,10 @@ fn an_ellipse_ends_as_the_wulff_shape_with_its_area_and_an_energy_that_never_ris
             assert!(energies.windows(2).all(|pair| pair[1] <= pair[0] * (1.0 + 2e-8)), "{text}, {n}: {energies:?}");
             let [first, last] = [0, series.len() - 1].map(|i| number(&series[i], "area"));
             assert!(n < 200 || (last / first - 1.0).abs() < 2e-4, "{text}: area {first} {last}");
-            distance_from_wulff(&positions(&done.rows("snapshots.csv")), &energy)
+            let distance = number(&done.summary()[0], "wulff_distance");
+            let nodes = positions(&done.rows("snapshots.csv"));
+            assert!((distance - wulff_distance(&nodes, &energy)).abs() < 1e-12, "{text}, {n}: {distance}");
+            distance
         });
         let order = (errors[0] / errors[2]).log2() / 2.0;
         println!("{text}: {errors:.7?}, order {order:.2}");
@@ -114,7 +102,7 @@ fn an_ellipse_ends_as_the_wulff_shape_with_its_area_and_an_energy_that_never_ris
         // The control: it is not the shape of another energy.
         let done = ellipse(&format!("--energy {text}"), 100, 3.0, 0.5);
         let other: Energy = "cos:4,0.02".parse().unwrap();
-        assert!(distance_from_wulff(&positions(&done.rows("snapshots.csv")), &other) > 5e-3);
+        assert!(wulff_distance(&positions(&done.rows("snapshots.csv")), &other) > 5e-3);
     }
 }
 

@@ -5,8 +5,9 @@ use std::collections::BTreeMap;
 
 use curvelax::{
     backend::gpu::{Variant, kernel, shader},
+    crystal::{MOST_WAVES, WAVE},
     ensemble::Status,
-    flow::{LAW, LENGTH_PENALTY, QUOTIENT},
+    flow::{DIFFUSIVITY_WAVES, ENERGY_UNIT, ENERGY_WAVES, LAW, LENGTH_PENALTY, QUOTIENT},
     number::{BIG, LN_HALVINGS, LN_TERMS, Real},
     scheme::{
         decay, dense, extrapolation,
@@ -352,6 +353,11 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("HALF_OVER_PI", 0.5 / std::f64::consts::PI),
         ("LENGTH_PENALTY", LENGTH_PENALTY as f64),
         ("QUOTIENT", QUOTIENT as f64),
+        ("ENERGY_WAVES", ENERGY_WAVES as f64),
+        ("DIFFUSIVITY_WAVES", DIFFUSIVITY_WAVES as f64),
+        ("ENERGY_UNIT", ENERGY_UNIT as f64),
+        ("MOST_WAVES", MOST_WAVES as f64),
+        ("WAVE", WAVE as f64),
         ("TRACE_FIELDS", shader::TRACE_FIELDS as f64),
         ("CURVE", 0.0),
     ];

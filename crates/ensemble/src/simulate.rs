@@ -339,7 +339,7 @@ impl Pool<'_> {
         for slot in slots.iter().copied() {
             let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
             trajectory.observe(backend.counters(slot), &backend.report(slot));
-            if trajectory.wants_state() || (trajectory.is_over() && trajectory.keeps_portrait()) {
+            if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
                 wanted.push(slot);
             }
         }

@@ -38,9 +38,9 @@ columns! { Outcome:
     length_end: number = end.length, "length of the last polygon";
     area_start: number = start.area, "signed area of the initial polygon, positive counter-clockwise";
     area_end: number = end.area, "signed area of the last polygon";
-    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one";
+    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one; of a crystal E²/(4|W|A) above its Wulff shape";
     excess_end: number = end.excess, "the same of the last polygon";
-    energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic";
+    energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic; of a crystal ∮γ ds";
     energy_end: number = end.energy, "the same at the end";
     k_min: number = end.k_min, "smallest curvature of the last state";
     k_max: number = end.k_max, "largest curvature of the last state";
@@ -56,6 +56,7 @@ columns! { Outcome:
     group: word = group, "value of the property `--group-by` of its outline";
     points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
     t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
+    wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
 }
 
 columns! { LevelRow:
@@ -408,8 +409,9 @@ pub(crate) mod tests {
             text,
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
-             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,\n"
+             mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,\
+             wulff_distance\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,\n"
         );
     }
 

@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
-use crate::conformance::{compare::MAX_SWEEPS, self_test};
+use crate::conformance::{Driven, compare::MAX_SWEEPS, self_test};
 use curvelax_backend::{
     Backend, DeviceKind,
     cpu::{CpuBackend, Vectorised},
@@ -144,9 +144,6 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
     }
-    if spec.has_crystals() {
-        return cpu(spec, n, "crystals run on the CPU".into());
-    }
     let none = if LOADS_DRIVERS { "no hardware GPU found" } else { "a static program cannot load GPU drivers" };
     let mut reason = none.to_string();
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
@@ -168,10 +165,6 @@ fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
 fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
     if spec.order == Order::Lexicographic {
         let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
-        return Err(Error::Request(message.into()));
-    }
-    if spec.has_crystals() {
-        let message = "--adapter: crystals run on the CPU only; leave out --adapter";
         return Err(Error::Request(message.into()));
     }
     let found = Gpu::list();
@@ -472,8 +465,8 @@ fn open_gpu<T: Vectorised>(
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
     let watched = !spec.event.is_empty();
-    let geometric = spec.is_geometric();
-    let variant = Variant { adaptive, watched, geometric, ..gpu.capacity().variant(blocks, spec.solver()) };
+    let driven = Driven::of(spec);
+    let variant = Variant { adaptive, watched, ..driven.variant(gpu.capacity().variant(blocks, spec.solver())) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.
     let tested = Method { max_sweeps: MAX_SWEEPS, ..*method };
     let then =
@@ -482,7 +475,7 @@ fn open_gpu<T: Vectorised>(
     gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
-    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive, geometric)?;
+    self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive, driven)?;
     Ok(Box::new(kernel.with_caps(method.max_sweeps, method.most_order)))
 }
 

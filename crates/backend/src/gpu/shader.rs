@@ -21,6 +21,8 @@ pub struct Variant {
     pub watched: bool,
     /// Moves the nodes by the force of the polygon. A constant for the same reason.
     pub geometric: bool,
+    /// Does so with an energy and a mobility that depend on the direction.
+    pub crystal: bool,
     /// Records what every stage of a step computes.
     pub traced: bool,
     /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
@@ -35,13 +37,15 @@ impl Variant {
             |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
         let exchanging = |solver| exchanges(solver).map(move |subgroup| Variant { subgroup, ..Variant::of(solver) });
         let made_for = |own| [own, Variant { traced: true, ..own }, Variant { adaptive: true, ..own }];
-        let forms = |own| [own, Variant { geometric: true, ..own }];
+        let geometric = |own| Variant { geometric: true, ..own };
+        let forms = |own| [own, geometric(own), Variant { crystal: true, ..geometric(own) }];
         Solver::ALL.into_iter().flat_map(exchanging).flat_map(made_for).flat_map(forms).collect()
     }
 
     /// Returns the variant for fixed steps.
     pub const fn of(solver: Solver) -> Variant {
-        Variant { solver, adaptive: false, watched: false, geometric: false, traced: false, subgroup: false }
+        let (adaptive, watched, geometric, crystal) = (false, false, false, false);
+        Variant { solver, adaptive, watched, geometric, crystal, traced: false, subgroup: false }
     }
 
     /// Returns the files of the kernel, in the order of the step.
@@ -90,11 +94,11 @@ fn of_solver(solver: Solver) -> &'static [ShaderPart] {
 
 /// Returns the whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
-    let Variant { solver, adaptive, watched, geometric, .. } = variant;
+    let Variant { solver, adaptive, watched, geometric, crystal, .. } = variant;
     let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
     let mut text = format!(
         "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
-         const WATCHED = {watched}; const GEOMETRIC = {geometric};\n"
+         const WATCHED = {watched}; const GEOMETRIC = {geometric}; const CRYSTAL = {crystal};\n"
     );
     for (_, part) in variant.parts() {
         text.push_str(part);

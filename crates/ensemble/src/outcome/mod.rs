@@ -8,6 +8,7 @@ pub mod linear_rate;
 pub mod rows;
 mod sink;
 mod standing;
+mod wulff;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
@@ -22,6 +23,7 @@ pub use levels::{LevelRow, RefinementLevel};
 pub use rows::{Extent, Rows};
 pub use sink::{Sink, Wish};
 pub use standing::{Paused, Standing};
+pub use wulff::{wulff_distance, wulff_outline};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -116,6 +118,8 @@ pub struct Outcome {
     pub points: u64,
     /// By how much its time moves with half the points of its outline, with `--refine`.
     pub t_data_error: Option<f64>,
+    /// Of a crystal, the distance of the last polygon from the Wulff shape of its area, as a length.
+    pub wulff_distance: Option<f64>,
     /// First times of the [events](crate::Event) of the spec, in their order.
     pub events: Vec<Option<f64>>,
     /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.

@@ -338,9 +338,6 @@ impl Spec {
             let problem = format!("its intervals were calibrated without crystals, and --{key} {value} is given");
             return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
         }
-        if self.backend == BackendChoice::Gpu {
-            return refused("crystals do not run on a GPU yet", "use --backend cpu");
-        }
         let waves =
             [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
         let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);

@@ -4,7 +4,12 @@
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
 //! through, in the order shape, flow, amplitude, decay, energy, diffusivity.
 
-use std::{borrow::Cow, fmt};
+use std::{
+    borrow::Cow,
+    f64::consts::PI,
+    fmt,
+    sync::{Mutex, PoisonError},
+};
 
 use crate::{
     Spec,
@@ -279,6 +284,19 @@ impl Spec {
     }
 }
 
+/// [`Flow::excess_rate`]. That of a crystal takes a millisecond, so the last one is kept: most members have the same.
+fn excess_rate(flow: &Flow, mode: u32, area: f64) -> Option<f64> {
+    static LAST: Mutex<Option<(Crystal, u32, Option<f64>)>> = Mutex::new(None);
+    let Flow::Crystal(crystal) = flow else { return flow.excess_rate(mode, area) };
+    let mut last = LAST.lock().unwrap_or_else(PoisonError::into_inner);
+    let of_unit = match *last {
+        Some((of, at, rate)) if of == *crystal && at == mode => rate,
+        _ => flow.excess_rate(mode, PI),
+    };
+    *last = Some((*crystal, mode, of_unit));
+    of_unit.map(|rate| rate * (PI / area).powi(2)).filter(|rate| rate.is_finite())
+}
+
 /// The names of the numbers that are drawn, so many for each key.
 pub(crate) fn drawn_names(counts: [usize; DRAWN]) -> Vec<String> {
     let name = |key: usize, rank: usize| match KEYS[key] {
@@ -314,7 +332,7 @@ impl Spec {
     /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
     /// [`Flow::excess_rate`].
     pub fn rate_in_theory(&self, values: &MemberValues, area: f64) -> Option<f64> {
-        let rate = values.flow.excess_rate(self.slowest_mode(values)?, area)?;
+        let rate = excess_rate(&values.flow, self.slowest_mode(values)?, area)?;
         Some(if values.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
     }
 

@@ -3,11 +3,14 @@
 use glam::DVec2;
 
 use super::{Course, Time, Trajectory, watch::ROUND};
-use crate::{Ended, Features, Observables, Outcome, Portrait, Status};
+use crate::{Ended, Features, Observables, Outcome, Portrait, Status, outcome};
 use curvelax_curve::polygon;
-use curvelax_flow::scheme::{
-    State,
-    member::{self, Decay, NEVER},
+use curvelax_flow::{
+    equilibrium::Equilibrium,
+    scheme::{
+        State,
+        member::{self, Decay, NEVER},
+    },
 };
 
 /// A fit with fewer points says nothing.
@@ -20,8 +23,8 @@ impl Trajectory<'_> {
     }
 
     /// Returns whether [`Trajectory::end`] needs the last state.
-    pub fn keeps_portrait(&self) -> bool {
-        self.portrait
+    pub fn needs_last_state(&self) -> bool {
+        self.portrait || self.equilibrium != Equilibrium::Circle
     }
 
     /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time if the excess falls as a
@@ -40,7 +43,7 @@ impl Trajectory<'_> {
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
-    /// Returns the member's results, without what theory predicts of them; `last` is its last state, for the portrait.
+    /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is [needed](Trajectory::needs_last_state).
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;
@@ -59,11 +62,13 @@ impl Trajectory<'_> {
         let status = if t_relax.is_some() { Status::Relaxed } else { failed.unwrap_or(Status::Unfinished) };
         let (rate, rate_r2) = self.rate().unzip();
         let (origin, unit) = (self.member.origin, self.unit);
-        let portrait = self.portrait.then(|| {
-            let before: Vec<DVec2> = self.member.nodes.iter().map(|node| *node + origin).collect();
-            let after = last.map_or_else(|| before.clone(), |state| self.placing().nodes(state));
-            Portrait { before, frames, after }
-        });
+        let before = || self.member.nodes.iter().map(|node| *node + origin).collect::<Vec<DVec2>>();
+        let after = || last.map_or_else(before, |state| self.placing().nodes(state));
+        let portrait = self.portrait.then(|| Portrait { before: before(), frames, after: after() });
+        let wulff_distance = match self.equilibrium {
+            Equilibrium::Circle => None,
+            Equilibrium::Wulff(energy) => Some(outcome::wulff_distance(&after(), &energy)).filter(|d| d.is_finite()),
+        };
         let outcome = Outcome {
             member: self.member.index,
             cell: self.member.cell,
@@ -86,6 +91,7 @@ impl Trajectory<'_> {
             label: std::mem::take(&mut self.member.label),
             group: std::mem::take(&mut self.member.group),
             points: self.member.nodes.len() as u64,
+            wulff_distance,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             ..Outcome::default()
         };

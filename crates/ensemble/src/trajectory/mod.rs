@@ -20,11 +20,14 @@ use crate::{
     schedule::{Clock, Outputs, Ticks},
 };
 use curvelax_base::error::{Error, Result};
-use curvelax_flow::scheme::{
-    Parameters, State,
-    member::{Counters, Report},
-    run::Run,
-    state::STATE_FIELDS,
+use curvelax_flow::{
+    equilibrium::Equilibrium,
+    scheme::{
+        Parameters, State,
+        member::{Counters, Report},
+        run::Run,
+        state::STATE_FIELDS,
+    },
 };
 
 /// The fourth power of the shortest segment is the fastest time scale there is, and a clock must be able to count this
@@ -110,6 +113,8 @@ pub struct Trajectory<'a> {
     /// The events of its spec, in their order.
     watches: Vec<Watch>,
     portrait: bool,
+    /// What its flow relaxes curves to.
+    equilibrium: Equilibrium,
 }
 
 impl Trajectory<'_> {

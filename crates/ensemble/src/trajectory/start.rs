@@ -85,6 +85,7 @@ impl<'a> Trajectory<'a> {
             crossed: None,
             watches,
             portrait: false,
+            equilibrium: flow.equilibrium(),
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));

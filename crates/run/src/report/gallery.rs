@@ -105,6 +105,10 @@ pub(super) fn columns(medium: Medium, count: usize) -> (usize, f64) {
     }
 }
 
+/// What is added to it where shapes at rest are drawn.
+const STYLE_OF_RESTS: &str =
+    ".panel .rest { fill: none; stroke-width: 1; stroke-dasharray: 4 3; stroke-opacity: 0.6 }\n";
+
 /// What is written below the panels.
 #[derive(Clone, Debug, Default)]
 pub struct Wording {
@@ -114,11 +118,17 @@ pub struct Wording {
     pub cells: Vec<String>,
     /// How and when each member ended.
     pub ends: Vec<String>,
+    /// The shape to which each relaxes, if it is not a circle.
+    pub rests: Vec<Vec<DVec2>>,
 }
 
 impl Wording {
     fn has_cells(&self) -> bool {
         self.cells.iter().any(|cell| !cell.is_empty())
+    }
+
+    fn has_rests(&self) -> bool {
+        self.rests.iter().any(|rest| !rest.is_empty())
     }
 }
 
@@ -134,9 +144,15 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
-    let mut svg = Svg::new(width, height, &style(medium), "Members before, during and after relaxation");
+    let rests = wording.has_rests();
+    let own = if rests { STYLE_OF_RESTS } else { "" };
+    let style = [&style(medium), own].concat();
+    let mut svg = Svg::new(width, height, &style, "Members before, during and after relaxation");
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
-    let legend = "grey: start, light: on the way, colour: end";
+    let legend = match rests {
+        true => "dashed: Wulff shape, grey: start, colour: end",
+        false => "grey: start, light: on the way, colour: end",
+    };
     match medium {
         Medium::Screen => {
             svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
@@ -149,9 +165,10 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
         let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
         let end = wording.ends.get(i).map_or(panel.film.status.name(), String::as_str);
         let cell = wording.cells.get(i).map_or("", String::as_str);
+        let rest = wording.rests.get(i).map_or(&[][..], Vec::as_slice);
         let fitted =
             |text: &str| if medium.is_screen() { text.into() } else { shortened(text, SIZE, side + 0.5 * GAP) };
-        draw_panel(&mut svg, panel, corner, &layout, [&wording.unit, &fitted(cell), &fitted(end)]);
+        draw_panel(&mut svg, panel, corner, &layout, rest, [&wording.unit, &fitted(cell), &fitted(end)]);
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
     match layout.common {
@@ -195,7 +212,14 @@ fn shown(frames: &[Vec<DVec2>]) -> Vec<usize> {
     shown
 }
 
-fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelLayout, [unit, cell, end]: [&str; 3]) {
+fn draw_panel(
+    svg: &mut Svg,
+    panel: &MemberPanel,
+    corner: DVec2,
+    layout: &PanelLayout,
+    rest: &[DVec2],
+    [unit, cell, end]: [&str; 3],
+) {
     let frame = layout.frame;
     let middle = corner + 0.5 * frame;
     let Film { status, points, .. } = panel.film;
@@ -211,6 +235,9 @@ fn draw_panel(svg: &mut Svg, panel: &MemberPanel, corner: DVec2, layout: &PanelL
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
         let last = panel.states.len() - 1;
+        if !rest.is_empty() {
+            svg.path("rest", &closed_path(&rest.iter().map(place).collect::<Vec<_>>()));
+        }
         for (i, nodes) in panel.states.iter().enumerate() {
             let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
             let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };

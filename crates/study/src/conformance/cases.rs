@@ -1,9 +1,11 @@
 //! The ensemble used for conformance tests: no two members alike, every flow, with and without redistribution.
 
+use curvelax_backend::gpu::Variant;
 use curvelax_base::error::Result;
 use curvelax_curve::polygon;
 use curvelax_ensemble::{Family, Spec, schedule::Ticks};
 use curvelax_flow::{
+    crystal::Crystal,
     flow::Flow,
     number::Precision,
     scheme::{
@@ -28,6 +30,71 @@ pub const MEMBERS: usize = 11;
 /// at every n above 47.
 fn tau(n: usize) -> f64 {
     1e-3 * (100.0 / n as f64).powi(4).min(20.0)
+}
+
+/// What drives the members of a comparison, and decides between kernels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Driven {
+    /// The paper's position equation.
+    Paper,
+    /// The force of the polygon.
+    Geometric,
+    /// That force, with an energy and a mobility that depend on the direction.
+    Crystals,
+}
+
+impl Driven {
+    /// What drives the members of a spec.
+    pub fn of(spec: &Spec) -> Driven {
+        match (spec.has_crystals(), spec.is_geometric()) {
+            (true, _) => Driven::Crystals,
+            (false, true) => Driven::Geometric,
+            (false, false) => Driven::Paper,
+        }
+    }
+
+    /// The variant of a kernel for it.
+    pub fn variant(self, of_paper: Variant) -> Variant {
+        Variant { geometric: self != Driven::Paper, crystal: self == Driven::Crystals, ..of_paper }
+    }
+
+    /// Changes members of the comparison, which are the paper's.
+    pub fn change(self, runs: &mut [Run<f64>]) {
+        if self == Driven::Paper {
+            return;
+        }
+        for (j, run) in runs.iter_mut().enumerate() {
+            run.parameters.geometric = 1.0;
+            if self == Driven::Crystals {
+                become_crystal(run, CRYSTALS[j % CRYSTALS.len()]);
+            }
+        }
+    }
+}
+
+/// Energies and mobilities of the members: one wave, two, one of each, and a mobility alone.
+const CRYSTALS: [[&str; 2]; LAWS] = [
+    ["cos:4,0.03,10", "cos:2,0"],
+    ["cos:2,0.05+cos:3,0.03,20", "cos:2,0.3,15+cos:1,0.2"],
+    ["cos:3,0.05", "cos:4,0.5"],
+    ["cos:2,0", "cos:2,0.5,30"],
+];
+
+/// Gives a member, which is at its start, the law of a crystal and thresholds of its excess over the Wulff shape.
+fn become_crystal(run: &mut Run<f64>, [energy, diffusivity]: [&str; 2]) {
+    let energy = energy.parse().expect("an energy");
+    let flow = Flow::Crystal(Crystal { energy, diffusivity: diffusivity.parse().expect("a mobility") });
+    let (n, p) = (run.state.curve.len(), &mut run.parameters);
+    p.law = flow.law(1.0);
+    p.polygon_ratio = flow.equilibrium().least_quotient(n);
+    p.growth = 0.0;
+    let now = Run::new(run.state.clone(), *p).report.now;
+    (run.report.before, run.report.now) = (now, now);
+    (p.relax_at, p.half_at) = (0.9 * now.excess, 0.95 * now.excess);
+    (p.fit_from, p.fit_to) = (now.excess, 1e-3 * now.excess);
+    if p.adaptive > 0.0 {
+        p.follow_to = 1e-3 * now.excess;
+    }
 }
 
 /// Creates `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.

@@ -5,14 +5,16 @@
 
 use super::{
     adaptive_members,
-    cases::LAWS,
+    cases::{Driven, LAWS},
     compare::{ConformanceRow, Left, compare_ends},
     members,
 };
 use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
-use curvelax_flow::scheme::evolve::Evolves;
-use curvelax_flow::scheme::step::Method;
+use curvelax_flow::{
+    number::Precision,
+    scheme::{evolve::Evolves, step::Method},
+};
 
 /// One for each law of [`members`]; with and without redistribution and pull.
 const MEMBERS: usize = LAWS;
@@ -20,10 +22,13 @@ const MEMBERS: usize = LAWS;
 const STEPS: u32 = 2;
 /// Tolerance of adaptive steps.
 const ADAPTIVE: f64 = 1e-3;
+/// Length of a single one, over a fixed step.
+const SHORT: f64 = 0.005;
 
-/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, in the paper's form or the geometric one,
-/// and compares the results with those
-/// of `method` on the CPU. The slots must be free, and are free again afterwards.
+/// Makes two steps with members of `n` nodes, or adaptive ones over the same time, in the paper's form, in the
+/// geometric one or as crystals, and compares the results with those of `method` on the CPU. In f32 a crystal makes one
+/// adaptive step of a given length: the errors of its nodes are next to rounding, and what follows from them is not the same
+/// on both sides. The slots must be free, and are free again afterwards.
 ///
 /// # Errors
 /// [`Error::Device`] with the quantity, its error and its bound; errors of `backend`.
@@ -34,14 +39,20 @@ pub fn self_test<T: Evolves>(
     method: &Method,
     n: usize,
     adaptive: bool,
-    geometric: bool,
+    driven: Driven,
 ) -> Result<()> {
     let count = MEMBERS.min(backend.slots());
     let mut launches = match adaptive {
         false => members(n, count, STEPS, T::PRECISION.tolerance())?,
         true => adaptive_members(n, count, STEPS, ADAPTIVE, T::PRECISION)?,
     };
-    launches.iter_mut().for_each(|launch| launch.parameters.geometric = f64::from(u8::from(geometric)));
+    driven.change(&mut launches);
+    if driven == Driven::Crystals && adaptive && T::PRECISION == Precision::F32 {
+        for launch in &mut launches {
+            launch.counters.goal = 1;
+            launch.report.progress.next = SHORT * launch.parameters.tau;
+        }
+    }
     // In all batches.
     let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();
     for (slot, launch) in slots.iter().zip(&launches) {

@@ -82,7 +82,6 @@ const REFUSED: &[(&str, &str)] = &[
         "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03",
     ),
     ("energy = 'cos:4,0.03'\nrefine = true", "--refine true: its intervals were calibrated without crystals, and "),
-    ("diffusivity = 'cos:4,0.5'\nbackend = 'gpu'", "--diffusivity cos:4,0.5: crystals do not run on a GPU yet; use"),
     (
         "diffusivity = 'cos:9,0.5'\npoints = 32",
         "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",

@@ -10,10 +10,13 @@ use super::{
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
     words::place,
 };
+use glam::DVec2;
+
 use curvelax_base::{error::Result, text::significant};
 use curvelax_draw::{chart, medium::Medium, width::told_apart};
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, outcome::wulff_outline};
 use curvelax_files::{names, portraits::Film};
+use curvelax_flow::equilibrium::Equilibrium;
 use curvelax_study::results::{
     cells::EnsembleStatistics,
     explained::Explained,
@@ -147,7 +150,17 @@ impl FinishedRun<'_> {
         let cells = told_apart(&cells, gallery::SIZE, side);
         let end = |film: &Film| format!("{}{}", film.status.name(), self.relaxed_at(film));
         let ends = self.films.iter().map(end);
-        Wording { unit: self.length_unit(), cells, ends: ends.collect() }
+        let rests = self.films.iter().map(|film| self.at_rest(film).unwrap_or_default());
+        Wording { unit: self.length_unit(), cells, ends: ends.collect(), rests: rests.collect() }
+    }
+
+    /// The Wulff shape of the last state of a crystal.
+    fn at_rest(&self, film: &Film) -> Option<Vec<DVec2>> {
+        let cell = film.member / self.spec().members_per_cell();
+        let spec = self.spec().of_cell(cell).ok()?;
+        let values = spec.values_of(film.member, cell).ok()?;
+        let Equilibrium::Wulff(energy) = values.flow.equilibrium() else { return None };
+        film.frames().last().map(|nodes| wulff_outline(nodes, &energy))
     }
 
     /// The members to watch: the first ones, or some of all cells.

@@ -37,7 +37,8 @@ pub fn on_gpu<T: Evolves>(
     let adaptive = launches.iter().any(|launch| launch.parameters.adaptive > 0.0);
     let watched = launches.iter().any(|launch| launch.parameters.branches().watched);
     let geometric = launches.iter().any(|launch| launch.parameters.branches().geometric);
-    let variant = Variant { adaptive, watched, geometric, ..adapter.capacity().variant(blocks(n)?, solver) };
+    let crystal = launches.iter().any(|launch| launch.parameters.branches().law.is_crystal());
+    let variant = Variant { adaptive, watched, geometric, crystal, ..adapter.capacity().variant(blocks(n)?, solver) };
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 

@@ -7,7 +7,7 @@ use super::{
 };
 use crate::conformance::{
     bounds::STAGES,
-    cases::{MEMBERS, members},
+    cases::{Driven, MEMBERS, members},
 };
 use curvelax_backend::{
     Backend,
@@ -21,20 +21,32 @@ use curvelax_flow::{
 };
 use curvelax_gpu as gpu;
 
-/// Compares everything that one step computes, stage by stage.
+/// Compares everything that one step of the paper computes, stage by stage.
 pub fn stages<T: Evolves>(
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
+    stages_of::<T>(Driven::Paper, adapter, solver, n, tamper)
+}
+
+/// Compares everything that one step of members driven so computes.
+pub fn stages_of<T: Evolves>(
+    driven: Driven,
+    adapter: &gpu::Gpu,
+    solver: Solver,
+    n: usize,
+    tamper: Option<Tamper>,
+) -> Result<Vec<ConformanceRow>> {
+    let mut launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
+    driven.change(&mut launches);
     let mut kernel = gpu::Kernel::<T>::new(
         adapter,
         blocks(n)?,
         MEMBERS,
         MAX_SWEEPS,
-        Variant { traced: true, ..adapter.capacity().variant(blocks(n)?, solver) },
+        Variant { traced: true, ..driven.variant(adapter.capacity().variant(blocks(n)?, solver)) },
     )?;
     for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
         kernel.load(slot, launch)?;
