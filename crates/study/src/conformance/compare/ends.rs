@@ -271,3 +271,27 @@ fn reported(report: &Report<f64>) -> Vec<f64> {
     numbers.extend([report.progress.turning, report.progress.travel]);
     numbers
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use curvelax_flow::scheme::State;
+    use glam::DVec2;
+
+    #[test]
+    fn steps_of_events_differ_by_one_only_where_their_times_are_compared() {
+        let left = |half_step, relax_step| Left {
+            state: State::from_nodes(&(0..6).map(|i| DVec2::from_angle(f64::from(i))).collect::<Vec<_>>()),
+            counters: Counters { half_step, relax_step, ..Counters::default() },
+            report: Default::default(),
+        };
+        let agree = |ours: [u32; 2], theirs: [u32; 2], adaptive| {
+            same_events(&left(ours[0], ours[1]), &left(theirs[0], theirs[1]), adaptive).is_ok()
+        };
+        assert!(agree([4, 9], [4, 9], false) && agree([4, 9], [4, 8], true));
+        assert!(!agree([4, 9], [4, 8], false), "fixed steps");
+        assert!(!agree([4, 9], [4, 7], true), "two steps apart");
+        assert!(!agree([4, NEVER], [3, NEVER], true), "no time is compared where one event is missing");
+        assert!(!agree([4, 9], [4, NEVER], true), "one side has no event");
+    }
+}
