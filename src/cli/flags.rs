@@ -10,7 +10,7 @@ use crate::{
     ensemble::{
         Spec,
         request::{
-            spec::{Heading, SpecKey},
+            spec::{HelpHeading, SpecKey},
             sweep::{self, SweepAxis},
             value::Takes,
         },
@@ -18,12 +18,12 @@ use crate::{
     error::{Error, Result, echo},
 };
 
-/// Heading of the flags for the method.
-pub(super) const METHOD: &str = Heading::Method.name();
-/// Heading of the flags for the machine.
-pub(super) const MACHINE: &str = Heading::Machine.name();
-/// Heading of the flags for output.
-pub const OUTPUT: &str = Heading::Output.name();
+/// HelpHeading of the flags for the method.
+pub(super) const METHOD: &str = HelpHeading::Method.name();
+/// HelpHeading of the flags for the machine.
+pub(super) const MACHINE: &str = HelpHeading::Machine.name();
+/// HelpHeading of the flags for output.
+pub const OUTPUT: &str = HelpHeading::Output.name();
 
 /// The flag that stands for several keys, and the first of them in the help after it.
 const ACCURATE: &str = "accurate";
@@ -62,7 +62,7 @@ fn flag(key: &'static SpecKey) -> Arg {
 impl clap::Args for SpecFlags {
     fn augment_args(command: Command) -> Command {
         let accurate =
-            Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(Heading::Evolution.name());
+            Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(HelpHeading::Evolution.name());
         let accurate = accurate.help(
             "What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine. Each can still be set on its own [default: off]",
         );

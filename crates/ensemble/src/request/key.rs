@@ -36,7 +36,7 @@ pub struct SpecKey {
     /// What stands for its value in the help.
     pub value: &'static str,
     /// The heading of the help under which it stands.
-    pub heading: Heading,
+    pub heading: HelpHeading,
     /// What it does, over several lines, with its default in brackets at the end.
     help: &'static str,
     /// What its flag takes.
@@ -58,7 +58,7 @@ impl SpecKey {
 
 /// A heading of the help.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heading {
+pub enum HelpHeading {
     /// Which curves.
     Ensemble,
     /// How they move, and when they count as relaxed.
@@ -71,15 +71,15 @@ pub enum Heading {
     Output,
 }
 
-impl Heading {
+impl HelpHeading {
     /// The heading.
     pub const fn name(self) -> &'static str {
         match self {
-            Heading::Ensemble => "Ensemble",
-            Heading::Evolution => "Evolution",
-            Heading::Method => "Method",
-            Heading::Machine => "Machine",
-            Heading::Output => "Output",
+            HelpHeading::Ensemble => "Ensemble",
+            HelpHeading::Evolution => "Evolution",
+            HelpHeading::Method => "Method",
+            HelpHeading::Machine => "Machine",
+            HelpHeading::Output => "Output",
         }
     }
 }
@@ -134,7 +134,7 @@ macro_rules! keys {
                     }
                 },
                 value: $value,
-                heading: Heading::$group,
+                heading: HelpHeading::$group,
                 help: concat!($($help, "\n",)+),
                 takes: <$type as Value>::TAKES,
                 missing: (&[$($missing)?] as &[&'static str]).first().copied(),

@@ -13,7 +13,7 @@ use curvelax_curve::Interpolation;
 
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
-    key::{Heading, OmittedKeys, Spec, SpecKey},
+    key::{HelpHeading, OmittedKeys, Spec, SpecKey},
     units::Units,
 };
 pub use curvelax_flow::{
