@@ -18,11 +18,11 @@ use crate::{
     error::{Error, Result, echo},
 };
 
-/// HelpHeading of the flags for the method.
+/// Heading of the flags for the method.
 pub(super) const METHOD: &str = HelpHeading::Method.name();
-/// HelpHeading of the flags for the machine.
+/// Heading of the flags for the machine.
 pub(super) const MACHINE: &str = HelpHeading::Machine.name();
-/// HelpHeading of the flags for output.
+/// Heading of the flags for output.
 pub const OUTPUT: &str = HelpHeading::Output.name();
 
 /// The flag that stands for several keys, and the first of them in the help after it.
