@@ -3,7 +3,7 @@
 /// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times, levels
 /// at which it pauses.
 struct Parameters {
-    law: array<real, 24>,
+    law: array<real, 32>,
     tau: real,
     omega: real,
     redistribution: real,

@@ -19,7 +19,7 @@ use crate::{
 /// Highest power of `k` in `b(k)`; the coefficients are the first numbers of [`Flow::law`].
 pub const MAX_DEGREE: usize = 8;
 /// Numbers of a law in the parameters that the kernel gets.
-pub const LAW: usize = 24;
+pub const LAW: usize = 32;
 /// The place of λ among them, after the coefficients.
 pub const LENGTH_PENALTY: usize = MAX_DEGREE;
 /// The place of the waves of the surface energy, [`MOST_WAVES`] of them.

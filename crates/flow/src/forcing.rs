@@ -1,0 +1,204 @@
+//! What acts on a curve beside its flow: a driving force along its normal, and quantities that are kept.
+//!
+//! ```text
+//! β = -∂²_s k + b(k) + F + λk + p,    F = const. or C (A - A₀)
+//! ```
+//!
+//! F is positive inwards: a circle of radius R under surface diffusion has R(t) = R₀ - F t. λ and p are the Lagrange
+//! multipliers that keep the length and the area.
+
+use std::{fmt, str::FromStr};
+
+use serde::{Deserialize, Serialize};
+
+use curvelax_base::text::number;
+
+use crate::{crystal::parse_numbers, flow::LAW};
+
+/// The place of F among the numbers of a law.
+pub const DRIVE: usize = crate::flow::QUOTIENT + 1;
+/// The place of C.
+pub const FEEDBACK: usize = DRIVE + 1;
+/// The place of A₀.
+pub const FEEDBACK_AREA: usize = DRIVE + 2;
+/// The place of what is kept: 1 the area, 2 the length, 3 both, 0 nothing.
+pub const CONSERVED: usize = DRIVE + 3;
+/// The place of the area that is kept.
+pub const KEPT_AREA: usize = DRIVE + 4;
+/// The place of the length that is kept.
+pub const KEPT_LENGTH: usize = DRIVE + 5;
+
+/// A driving force along the normal, positive inwards, in units of length/time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Drive {
+    /// F, the same everywhere and always.
+    Constant(f64),
+    /// `F = C (A - A₀)`: an area above A₀ shrinks.
+    Feedback {
+        /// C, in 1/(length·time).
+        gain: f64,
+        /// A₀.
+        area: f64,
+    },
+}
+
+/// Which of area and length a flow keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Conserved {
+    /// The area.
+    Area,
+    /// The length.
+    Length,
+    /// Both.
+    AreaAndLength,
+}
+
+/// All of it, for one member.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Forcing {
+    /// The driving force.
+    pub drive: Option<Drive>,
+    /// What is kept.
+    pub conserved: Option<Conserved>,
+    /// The area and the length at which it is kept; of what is not kept, any number.
+    pub kept: [f64; 2],
+}
+
+impl Forcing {
+    /// Writes it into the numbers of a [law](crate::flow::Flow::law), for lengths in units of `unit` and times in units of its
+    /// fourth power.
+    pub fn write(&self, law: &mut [f64; LAW], unit: f64) {
+        match self.drive {
+            None => {}
+            Some(Drive::Constant(force)) => law[DRIVE] = force * unit.powi(3),
+            Some(Drive::Feedback { gain, area }) => {
+                law[FEEDBACK] = gain * unit.powi(5);
+                law[FEEDBACK_AREA] = area / (unit * unit);
+            }
+        }
+        if let Some(conserved) = self.conserved {
+            law[CONSERVED] = conserved.code();
+            let [area, length] = self.kept;
+            if conserved.keeps_area() {
+                law[KEPT_AREA] = area / (unit * unit);
+            }
+            if conserved.keeps_length() {
+                law[KEPT_LENGTH] = length / unit;
+            }
+        }
+    }
+}
+
+impl Conserved {
+    /// Whether the area is kept.
+    pub const fn keeps_area(self) -> bool {
+        matches!(self, Conserved::Area | Conserved::AreaAndLength)
+    }
+
+    /// Whether the length is kept.
+    pub const fn keeps_length(self) -> bool {
+        matches!(self, Conserved::Length | Conserved::AreaAndLength)
+    }
+
+    fn code(self) -> f64 {
+        f64::from(u8::from(self.keeps_area()) + 2 * u8::from(self.keeps_length()))
+    }
+}
+
+impl fmt::Display for Drive {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Drive::Constant(force) => write!(f, "{}", number(*force)),
+            Drive::Feedback { gain, area } => write!(f, "feedback:{},{}", number(*gain), number(*area)),
+        }
+    }
+}
+
+impl FromStr for Drive {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Drive, String> {
+        let Some((name, arguments)) = text.split_once(':') else {
+            return match parse_numbers(text)?.as_slice() {
+                [force] => Ok(Drive::Constant(*force)),
+                _ => Err("drive takes one force, or feedback:C,A0".into()),
+            };
+        };
+        match (name, parse_numbers(arguments)?.as_slice()) {
+            ("feedback", [gain, area]) if *area > 0.0 => Ok(Drive::Feedback { gain: *gain, area: *area }),
+            ("feedback", [_, area]) => Err(format!("feedback to an area of {area}, which must be above 0")),
+            ("feedback", _) => Err("feedback takes C and the area A0, for example `feedback:1,3.14`".into()),
+            _ => Err("a driving force is a number, or feedback:C,A0".into()),
+        }
+    }
+}
+
+impl fmt::Display for Conserved {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Conserved::Area => "area",
+            Conserved::Length => "length",
+            Conserved::AreaAndLength => "area,length",
+        })
+    }
+}
+
+impl FromStr for Conserved {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Conserved, String> {
+        match text {
+            "area" => Ok(Conserved::Area),
+            "length" => Ok(Conserved::Length),
+            "area,length" | "length,area" => Ok(Conserved::AreaAndLength),
+            _ => Err("area, length, or area,length".into()),
+        }
+    }
+}
+
+macro_rules! as_text {
+    ($($name:ident)*) => {
+        $(
+            impl From<$name> for String {
+                fn from(value: $name) -> String {
+                    value.to_string()
+                }
+            }
+
+            impl TryFrom<String> for $name {
+                type Error = String;
+                fn try_from(text: String) -> Result<$name, String> {
+                    text.parse()
+                }
+            }
+        )*
+    };
+}
+
+as_text!(Drive Conserved);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_force_prints_as_it_is_parsed() {
+        for text in ["0.5", "-2", "feedback:1,3.5"] {
+            assert_eq!(text.parse::<Drive>().unwrap().to_string(), text);
+        }
+        for text in ["", "1,2", "feedback:1", "feedback:1,-2", "push:1", "nan"] {
+            assert!(text.parse::<Drive>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_kept_prints_as_it_is_parsed() {
+        for text in ["area", "length", "area,length"] {
+            assert_eq!(text.parse::<Conserved>().unwrap().to_string(), text);
+        }
+        assert_eq!("length,area".parse(), Ok(Conserved::AreaAndLength));
+        assert!("energy".parse::<Conserved>().is_err());
+    }
+}
