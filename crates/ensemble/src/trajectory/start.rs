@@ -169,8 +169,16 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
 /// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
 fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
+    let mut law = flow.law(unit);
+    {
+        let mut f = curvelax_flow::forcing::Forcing::default();
+        if let Ok(t) = std::env::var("XDRIVE") { f.drive = Some(t.parse().unwrap()); }
+        if let Ok(t) = std::env::var("XCONS") { f.conserved = Some(t.parse().unwrap()); f.kept = [polygon::signed_area(nodes), polygon::length(nodes)]; }
+        if let Ok(t) = std::env::var("XAT") { let (a, b) = t.split_once(',').unwrap(); f.kept = [a.parse().unwrap(), b.parse().unwrap()]; }
+        f.write(&mut law, unit);
+    }
     Parameters {
-        law: flow.law(unit),
+        law,
         tau: match spec.pace() {
             Pace::Fixed(Tau::Step(tau)) => tau / time,
             Pace::Fixed(Tau::Auto) => own_tau(rate),
