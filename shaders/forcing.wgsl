@@ -58,8 +58,10 @@ fn correct() {
     let f = edge(x.plus1, y.plus1);
     let ax = real(0.5) * (e.y + f.y);
     let ay = -(real(0.5) * (e.x + f.x));
-    let lx = e.x / e.length - f.x / f.length;
-    let ly = e.y / e.length - f.y / f.length;
+    let by_e = vec(1.0) / e.length;
+    let by_f = vec(1.0) / f.length;
+    let lx = e.x * by_e - f.x * by_f;
+    let ly = e.y * by_e - f.y * by_f;
     let part = vec(block_sum(ax * ax + ay * ay), block_sum(ax * lx + ay * ly), block_sum(lx * lx + ly * ly), 0.0);
     let squares = ring_sums(part);
     let p = &all_parameters[member].law;

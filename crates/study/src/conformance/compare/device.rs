@@ -39,7 +39,8 @@ pub fn on_gpu<T: Evolves>(
     let geometric = launches.iter().any(|launch| launch.parameters.branches().geometric);
     let crystal = launches.iter().any(|launch| launch.parameters.branches().law.is_crystal());
     let forced = launches.iter().any(|launch| launch.parameters.branches().law.is_forced());
-    let variant = Variant { adaptive, watched, geometric, crystal, forced, ..adapter.capacity().variant(blocks(n)?, solver) };
+    let variant =
+        Variant { adaptive, watched, geometric, crystal, forced, ..adapter.capacity().variant(blocks(n)?, solver) };
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 
