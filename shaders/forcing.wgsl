@@ -35,8 +35,12 @@ fn act(k: vec, r: vec, beta: vec) -> vec {
     return beta + (vec(force) + multiplier * k);
 }
 
-/// Moves the nodes of the new curve by a time tau of the force, along the inward normals of the old one.
-fn push(x: vec, y: vec) {
+/// Increments of x and y.
+struct Moves { x: vec, y: vec }
+
+/// Adds a time tau of the force, along the inward normals of the old curve, to the increments of x and y; moves the nodes of
+/// the new curve.
+fn push(x: vec, y: vec) -> Moves {
     settle();
     let old = windows(x, y);
     let ex = rises_of_places(old.a);
@@ -44,14 +48,17 @@ fn push(x: vec, y: vec) {
     let along_x = ex.here + ex.plus1;
     let along_y = ey.here + ey.plus1;
     let across = (tau * force) / sqrt(along_x * along_x + along_y * along_y);
+    let by = Moves(u - across * along_y, v + across * along_x);
     settle();
-    let nodes = windows(moved(here(new_x), -(across * along_y)), moved(here(new_y), across * along_x));
+    let nodes = windows(moved(x, by.x), moved(y, by.y));
     new_x = nodes.a;
     new_y = nodes.b;
+    return by;
 }
 
-/// Moves the nodes of the new curve along the gradients of its area and its length to those that are kept.
-fn correct() {
+/// Moves the nodes of the new curve, which are `by` from the old ones, along the gradients of its area and its length to those
+/// that are kept.
+fn correct(old_x: vec, old_y: vec, by: Moves) {
     let x = rises_of_places(new_x);
     let y = rises_of_places(new_y);
     let e = edge(x.here, y.here);
@@ -65,13 +72,14 @@ fn correct() {
     let part = vec(block_sum(ax * ax + ay * ay), block_sum(ax * lx + ay * ly), block_sum(lx * lx + ly * ly), 0.0);
     let squares = ring_sums(part);
     let p = &all_parameters[member].law;
+    var along = vec2<real>(0.0, 0.0);
     for (var round = 0u; round < ROUNDS; round++) {
         // Others may still read the last sums.
         workgroupBarrier();
         let now = sizes(new_x, new_y);
-        let by = balanced(squares, p[KEPT_AREA] - now.x, p[KEPT_LENGTH] - now.y);
+        along += balanced(squares, p[KEPT_AREA] - now.x, p[KEPT_LENGTH] - now.y);
         let nodes = windows(
-            moved(here(new_x), by.x * ax + by.y * lx), moved(here(new_y), by.x * ay + by.y * ly),
+            moved(old_x, by.x + (along.x * ax + along.y * lx)), moved(old_y, by.y + (along.x * ay + along.y * ly)),
         );
         new_x = nodes.a;
         new_y = nodes.b;

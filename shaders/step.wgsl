@@ -80,12 +80,13 @@ fn step(begun: Course, moves: bool) -> Course {
     }
     let x = load_field(curve);
     let y = load_field(curve + 1u);
-    let nodes = windows(advanced(0u, x, u), advanced(1u, y, v));
-    new_x = nodes.a;
-    new_y = nodes.b;
     if FORCED {
-        push(x, y);
-        correct();
+        let by = push(x, y);
+        correct(x, y, by);
+    } else {
+        let nodes = windows(advanced(0u, x, u), advanced(1u, y, v));
+        new_x = nodes.a;
+        new_y = nodes.b;
     }
     displaced(x, y);
     new_r = here(r_new);

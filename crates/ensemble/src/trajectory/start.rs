@@ -172,9 +172,17 @@ fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2],
     let mut law = flow.law(unit);
     {
         let mut f = curvelax_flow::forcing::Forcing::default();
-        if let Ok(t) = std::env::var("XDRIVE") { f.drive = Some(t.parse().unwrap()); }
-        if let Ok(t) = std::env::var("XCONS") { f.conserved = Some(t.parse().unwrap()); f.kept = [polygon::signed_area(nodes), polygon::length(nodes)]; }
-        if let Ok(t) = std::env::var("XAT") { let (a, b) = t.split_once(',').unwrap(); f.kept = [a.parse().unwrap(), b.parse().unwrap()]; }
+        if let Ok(t) = std::env::var("XDRIVE") {
+            f.drive = Some(t.parse().unwrap());
+        }
+        if let Ok(t) = std::env::var("XCONS") {
+            f.conserved = Some(t.parse().unwrap());
+            f.kept = [polygon::signed_area(nodes), polygon::length(nodes)];
+        }
+        if let Ok(t) = std::env::var("XAT") {
+            let (a, b) = t.split_once(',').unwrap();
+            f.kept = [a.parse().unwrap(), b.parse().unwrap()];
+        }
         f.write(&mut law, unit);
     }
     Parameters {

@@ -78,25 +78,37 @@ pub fn act<N: Number>(
     total
 }
 
-/// Moves the nodes of a new curve by a time τ of the force that [`act`] has found, along the inward normals of the old one.
+/// Adds a time τ of the force that [`act`] has found, along the inward normals of the old curve, to the increments of x and y:
+/// into `by`, by which the nodes of the new curve move.
 #[inline(always)]
-pub fn push<N: Number>(old: &Curve<N>, new: &mut Curve<N>, motion: &Motion<N>, tau: N) {
-    let by = tau * motion.force;
+pub fn push<N: Number>(
+    old: &Curve<N>,
+    new: &mut Curve<N>,
+    motion: &Motion<N>,
+    tau: N,
+    increments: [&Ring<N>; 2],
+    by: &mut [Ring<N>; 2],
+) {
+    let distance = tau * motion.force;
     for i in 0..old.len() {
         let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
         let (along_x, along_y) = (ex + fx, ey + fy);
-        let across = by / (along_x * along_x + along_y * along_y).sqrt();
-        new.x[i] = place::moved(new.x[i], -(across * along_y));
-        new.y[i] = place::moved(new.y[i], across * along_x);
+        let across = distance / (along_x * along_x + along_y * along_y).sqrt();
+        by[0][i] = increments[0][i] - across * along_y;
+        by[1][i] = increments[1][i] + across * along_x;
+        new.x[i] = place::moved(old.x[i], by[0][i]);
+        new.y[i] = place::moved(old.y[i], by[1][i]);
     }
     new.x.close();
     new.y.close();
 }
 
-/// Moves the nodes of a new curve along the gradients of its area and its length to those that are kept. `gradients` is
-/// room for them, x and y of each.
+/// Moves the nodes of a new curve, which are `by` from those of the old one, along the gradients of its area and its length to
+/// those that are kept. From the old nodes, so that they are rounded once. `gradients` is room for them, x and y of each.
 #[inline(always)]
 pub fn correct<N: Number>(
+    [old_x, old_y]: [&Ring<N>; 2],
+    by: [&Ring<N>; 2],
     new: &mut Curve<N>,
     p: &Parameters<N>,
     kind: Kind,
@@ -119,14 +131,15 @@ pub fn correct<N: Number>(
         squares.add(i, [ax * ax + ay * ay, ax * lx + ay * ly, lx * lx + ly * ly]);
     }
     let (squares, kept) = (squares.totals(), kind.kept());
+    let mut along = [N::of(0.0); 2];
     for _ in 0..ROUNDS {
         let [area, length] = sizes(new, blocks);
-        let [along_area, along_length] =
-            balanced(kept, squares, [p.law[KEPT_AREA] - area, p.law[KEPT_LENGTH] - length]);
+        let found = balanced(kept, squares, [p.law[KEPT_AREA] - area, p.law[KEPT_LENGTH] - length]);
+        along = [along[0] + found[0], along[1] + found[1]];
         for i in 0..new.len() {
             let [ax, ay, lx, ly] = [&gradients[0], &gradients[1], &gradients[2], &gradients[3]].map(|ring| ring[i]);
-            new.x[i] = place::moved(new.x[i], along_area * ax + along_length * lx);
-            new.y[i] = place::moved(new.y[i], along_area * ay + along_length * ly);
+            new.x[i] = place::moved(old_x[i], by[0][i] + (along[0] * ax + along[1] * lx));
+            new.y[i] = place::moved(old_y[i], by[1][i] + (along[0] * ay + along[1] * ly));
         }
         new.x.close();
         new.y.close();

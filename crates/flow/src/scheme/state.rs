@@ -330,6 +330,8 @@ pub struct Workspace<N> {
     pub curvature: Memory<N, 1>,
     /// The position system and its solver.
     pub position: Memory<N, 2>,
+    /// How far the nodes of the new curve have moved, where forces move them.
+    pub by: [Ring<N>; 2],
     /// The gradients of the new curve's area and length, x and y of each, where they are kept.
     pub gradients: [Ring<N>; 4],
     /// Whether to fill the rows of the systems even if the solver does not need them.
@@ -349,7 +351,7 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        21 + S::FACTS.numbers_per_node
+        23 + S::FACTS.numbers_per_node
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
@@ -378,6 +380,7 @@ impl<N: Number> Workspace<N> {
             new: Curve::zeros(n),
             curvature,
             position,
+            by: std::array::from_fn(|_| ring()),
             gradients: std::array::from_fn(|_| ring()),
             traced: false,
         }

@@ -102,7 +102,7 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, gradients, traced } = work;
+    let Workspace { blocks, motion, new, curvature, position, by, gradients, traced } = work;
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
@@ -132,11 +132,12 @@ pub fn step_by<N: Number, S: Solves>(
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
-    state::advance(0, &old.x, &increments.x, &mut new.x);
-    state::advance(1, &old.y, &increments.y, &mut new.y);
     if branches.law.is_forced() {
-        forcing::push(old, new, motion, p.tau);
-        forcing::correct(new, p, branches.law, *blocks, gradients);
+        forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
+        forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);
+    } else {
+        state::advance(0, &old.x, &increments.x, &mut new.x);
+        state::advance(1, &old.y, &increments.y, &mut new.y);
     }
     pull::pull(new, p, branches);
 
