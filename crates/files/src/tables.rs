@@ -57,6 +57,7 @@ columns! { Outcome:
     points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
     t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
+    t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a twentieth of its length, and the rest is that of a circle; t_end is then a little earlier";
 }
 
 columns! { LevelRow:
@@ -410,8 +411,8 @@ pub(crate) mod tests {
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
              mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,\
-             wulff_distance\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,\n"
+             wulff_distance,t_vanish\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,,\n"
         );
     }
 

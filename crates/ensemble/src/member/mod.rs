@@ -40,7 +40,7 @@ use curvelax_curve::{
     outlines::{self, Labelled},
     polygon,
 };
-use curvelax_flow::{flow::Flow, solver::ring::MIN_POINTS};
+use curvelax_flow::{flow::Flow, forcing::Forcing, solver::ring::MIN_POINTS};
 
 /// Draws for one member before giving up. By Rice's formula the harshest law allowed, a thousand modes of one size,
 /// still yields two valid draws in a hundred.
@@ -75,6 +75,8 @@ pub struct Member {
     pub given_excess: Option<f64>,
     /// Its law of motion, if each member has its own; otherwise that of the spec.
     pub flow: Option<Flow>,
+    /// What acts beside it, if each member has values of its own; otherwise that of the spec.
+    pub forcing: Option<Forcing>,
     /// The numbers that were drawn for it, in the order of [`Family::drawn`].
     pub drawn: Vec<f64>,
     /// The coefficients of cos mθ and sin mθ in its perturbation, of the lowest [`FEATURE_MODES`] modes m.
@@ -126,6 +128,8 @@ struct MemberCurve {
     factor: RadialFactor,
     /// Its law of motion, if it is not that of all.
     flow: Option<Flow>,
+    /// What acts beside it, if members have values of their own.
+    forcing: Option<Forcing>,
 }
 
 /// The group of outlines that do not have the property.
@@ -357,7 +361,7 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
+        let MemberCurve { own, factor, flow, forcing } = self.own_curve(index)?;
         let sampler =
             own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.sampling, self.points())).transpose()?;
         let own = own.as_ref().unwrap_or(&self.outline_curve);
@@ -383,7 +387,20 @@ impl Family {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
         let given_excess = own.given_excess(&factor);
-        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, given_excess, flow, drawn, coefficients })
+        Ok(Member {
+            index,
+            cell: 0,
+            label,
+            group,
+            nodes,
+            origin,
+            mollified,
+            given_excess,
+            flow,
+            forcing,
+            drawn,
+            coefficients,
+        })
     }
 
     /// The curve of member `index` before it is sampled, perturbed, at any u, and its law of motion, if it has its own.
@@ -406,11 +423,12 @@ impl Family {
             }
             _ => None,
         };
+        let forcing = values.as_ref().map(|values| values.forcing);
         let flow = values.and_then(|values| match values.flow {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
         });
-        Ok(MemberCurve { own, factor, flow })
+        Ok(MemberCurve { own, factor, flow, forcing })
     }
 
     /// The first coefficients of a member's perturbation. Where others are perturbed, a member that is not has zeros.

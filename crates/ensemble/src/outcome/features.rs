@@ -16,7 +16,7 @@ use curvelax_base::error::Result;
 use curvelax_curve::{DESCRIPTORS, Modes, descriptors, polygon};
 
 /// Keys on which the features depend.
-const KEYS: [&str; 7] = ["shape", "flow", "energy", "diffusivity", "amplitude", "decay", "modes"];
+const KEYS: [&str; 8] = ["shape", "flow", "energy", "diffusivity", "drive", "amplitude", "decay", "modes"];
 
 /// The features of a member: a number for each of [`Spec::cell_features`], NaN if unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -16,6 +16,7 @@ use curvelax_curve::Shape;
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
+    forcing::Drive,
 };
 
 /// What may be drawn.
@@ -64,6 +65,18 @@ impl Drawable for Shape {
     /// Names of files have parentheses of their own.
     fn has_distributions(text: &str) -> bool {
         text.contains('(') && !text.starts_with("file:")
+    }
+}
+
+impl Drawable for Drive {
+    const EXPECTED: &'static str = "a number, or text such as \"feedback:1,3.14\" or \"uniform(0.1..1)\"";
+
+    fn read(text: &str) -> Result<Drive, String> {
+        text.parse()
+    }
+
+    fn of_number(number: f64) -> Option<Drive> {
+        number.is_finite().then_some(Drive::Constant(number))
     }
 }
 

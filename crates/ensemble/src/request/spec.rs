@@ -11,11 +11,13 @@ use crate::request::sweep::{self, Sweep};
 use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
 use curvelax_curve::Interpolation;
 
+use crate::request::drawn::Drawn;
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
     key::{HelpHeading, OmittedKeys, Spec, SpecKey},
     units::Units,
 };
+use curvelax_flow::forcing::Drive;
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
@@ -195,7 +197,13 @@ impl Spec {
 
     /// Whether a member ends when it is relaxed.
     pub fn stops_when_relaxed(&self) -> bool {
-        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto))
+        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto) && !self.may_vanish())
+    }
+
+    /// Whether members are driven inwards by a constant force, at least some: they are followed until they vanish.
+    fn may_vanish(&self) -> bool {
+        let inwards = |drive: &Drawn<Drive>| matches!(drive.typical(), Drive::Constant(force) if *force > 0.0);
+        self.drive.as_ref().is_some_and(inwards) || self.sweep.has("drive")
     }
 
     /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
@@ -319,6 +327,7 @@ mod tests {
         let optional = [
             "energy",
             "diffusivity",
+            "drive",
             "outlines",
             "group-by",
             "interpolate",

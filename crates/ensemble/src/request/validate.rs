@@ -57,6 +57,7 @@ impl Spec {
         self.check_method()?;
         self.check_drawn()?;
         self.check_crystals()?;
+        self.check_forcing()?;
         self.check_rounding()?;
         self.check_relaxation()?;
         self.check_combinations()?;
@@ -80,6 +81,9 @@ impl Spec {
         self.t_end.get_or_insert(DEFAULT_T_END.into());
         if self.stops_when_relaxed() {
             self.stop_when_relaxed = Some(true);
+        } else if self.t_end == Some(FinalTime::Auto) && self.sweep.has("drive") {
+            // Cells whose members vanish must not differ in it from those whose members grow.
+            self.stop_when_relaxed = Some(false);
         }
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
@@ -348,6 +352,17 @@ impl Spec {
             }
             false => Ok(()),
         }
+    }
+
+    /// Refuses what a driven flow does not have.
+    fn check_forcing(&self) -> Result<()> {
+        let Some(drive) = &self.drive else { return Ok(()) };
+        if self.refine {
+            let problem =
+                format!("its intervals were calibrated without a driving force, and --drive {drive} is given");
+            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+        }
+        Ok(())
     }
 
     fn check_rounding(&self) -> Result<()> {

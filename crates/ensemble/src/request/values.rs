@@ -2,11 +2,11 @@
 //!
 //! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
-//! through, in the order shape, flow, amplitude, decay, energy, diffusivity.
+//! through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive.
 
 use std::{
     borrow::Cow,
-    f64::consts::PI,
+    f64::consts::{PI, TAU},
     fmt,
     sync::{Mutex, PoisonError},
 };
@@ -23,6 +23,7 @@ use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::{
     crystal::{Crystal, Diffusivity, Energy},
     flow::Flow,
+    forcing::{Conserved, Drive, Forcing},
 };
 
 /// Maximum number of members that are shown one by one.
@@ -33,9 +34,9 @@ const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 /// The keys whose values may be drawn.
-const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity"];
+const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity", "drive"];
 /// Their number.
-pub(crate) const DRAWN: usize = 6;
+pub(crate) const DRAWN: usize = 7;
 /// Those that are numbers, and so have one.
 const NUMBERS: [&str; 2] = ["amplitude", "decay"];
 /// Bits of the places of a key.
@@ -48,6 +49,8 @@ pub struct MemberValues<'a> {
     pub shape: Cow<'a, Shape>,
     /// The law of motion.
     pub flow: Cow<'a, Flow>,
+    /// What acts beside it, for unit mobility.
+    pub forcing: Forcing,
     /// σ of the perturbation.
     pub amplitude: f64,
     /// p of the perturbation.
@@ -64,9 +67,15 @@ impl Spec {
                 self.energy.as_ref().map(|energy| *energy.typical()),
                 self.diffusivity.as_ref().map(|diffusivity| *diffusivity.typical()),
             ),
+            forcing: self.forcing(self.drive.as_ref().map(|drive| *drive.typical())),
             amplitude: *self.amplitude.typical(),
             decay: *self.decay.typical(),
         }
+    }
+
+    /// What acts beside the flow, with this driving force, whose time becomes that of unit mobility.
+    fn forcing(&self, drive: Option<Drive>) -> Forcing {
+        Forcing { drive: drive.map(|drive| drive.scaled(1.0 / self.mobility())), ..Forcing::default() }
     }
 
     /// The flow, with the energy and the mobility if they depend on the direction.
@@ -128,8 +137,8 @@ impl Spec {
 
     /// Whether each member has a law of motion of its own.
     pub fn has_drawn_flow(&self) -> bool {
-        let [_, flow, _, _, energy, diffusivity] = self.distributions();
-        [flow, energy, diffusivity].into_iter().any(|of_key| !of_key.is_empty())
+        let [_, flow, _, _, energy, diffusivity, drive] = self.distributions();
+        [flow, energy, diffusivity, drive].into_iter().any(|of_key| !of_key.is_empty())
     }
 
     /// Whether several members are made of one of many outlines.
@@ -195,6 +204,7 @@ impl Spec {
         let of_energy = || Some(told("energy", self.energy.as_ref()?, self.energy.as_ref()?.refusal()?));
         let of_diffusivity =
             || Some(told("diffusivity", self.diffusivity.as_ref()?, self.diffusivity.as_ref()?.refusal()?));
+        let of_drive = || Some(told("drive", self.drive.as_ref()?, self.drive.as_ref()?.refusal()?));
         let of_law = || {
             let [_, _, amplitude, decay, ..] = self.distributions();
             let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
@@ -210,7 +220,8 @@ impl Spec {
                 if amplitude.is_empty() { ("decay", &self.decay) } else { ("amplitude", &self.amplitude) };
             Some(told(drawn.0, drawn.1, reason?))
         };
-        of_shape().or_else(of_flow).or_else(of_energy).or_else(of_diffusivity).or_else(of_law)
+        let of_motion = of_flow().or_else(of_energy).or_else(of_diffusivity).or_else(of_drive);
+        of_shape().or(of_motion).or_else(of_law)
     }
 
     /// Checks the values of `member`, as for [`Spec::values`].
@@ -232,7 +243,7 @@ impl Spec {
 
     /// The distributions of each key.
     pub(crate) fn distributions(&self) -> [&[Distribution]; DRAWN] {
-        let Spec { shape, flow, amplitude, decay, energy, diffusivity, .. } = self;
+        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, .. } = self;
         let energy = energy.as_ref().map_or(&[][..], Drawn::distributions);
         let diffusivity = diffusivity.as_ref().map_or(&[][..], Drawn::distributions);
         [
@@ -242,6 +253,7 @@ impl Spec {
             decay.distributions(),
             energy,
             diffusivity,
+            drive.as_ref().map_or(&[][..], Drawn::distributions),
         ]
     }
 
@@ -254,14 +266,16 @@ impl Spec {
     }
 
     fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
-        let [shape, flow, amplitude, decay, energy, diffusivity] = self.numbers(uniform);
+        let [shape, flow, amplitude, decay, energy, diffusivity, drive] = self.numbers(uniform);
         let of_energy = self.energy.as_ref().map(|drawn| own("energy", drawn, &energy)).transpose()?;
         let of_diffusivity =
             self.diffusivity.as_ref().map(|drawn| own("diffusivity", drawn, &diffusivity)).transpose()?;
+        let of_drive = self.drive.as_ref().map(|drawn| own("drive", drawn, &drive)).transpose()?;
         let flow = own("flow", &self.flow, &flow)?;
         Ok(MemberValues {
             shape: own("shape", &self.shape, &shape)?,
             flow: self.law_of_motion(flow, of_energy.map(|of| *of), of_diffusivity.map(|of| *of)),
+            forcing: self.forcing(of_drive.map(|of| *of)),
             amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
             decay: *own("decay", &self.decay, &decay)?,
         })
@@ -317,9 +331,9 @@ fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Resu
 
 /// What linear theory says about a member of a spec.
 impl Spec {
-    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow.
-    pub fn growth(&self, flow: &Flow, area: f64) -> Option<f64> {
-        flow.growth(area).map(|growth| growth / self.mobility())
+    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow, if that is all that acts.
+    pub fn growth(&self, flow: &Flow, forcing: &Forcing, area: f64) -> Option<f64> {
+        flow.growth(area).filter(|_| !forcing.acts()).map(|growth| growth / self.mobility())
     }
 
     /// The lowest mode, 2 or more, of a member with these values: it decays last.
@@ -328,12 +342,21 @@ impl Spec {
         values.shape.lowest_mode().into_iter().chain(drawn).min()
     }
 
-    /// The rate at which, by linear theory, the excess of a member of area `area` falls once only the slowest mode is
+    /// The rate at which, by linear theory, the excess of a member of this area and length falls once only the slowest mode is
     /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
-    /// [`Flow::excess_rate`].
-    pub fn rate_in_theory(&self, values: &MemberValues, area: f64) -> Option<f64> {
-        let rate = excess_rate(&values.flow, self.slowest_mode(values)?, area)?;
-        Some(if values.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
+    /// [`Flow::excess_rate`]. A driven one has none, since its radius changes; one that keeps area or length keeps the radius.
+    pub fn rate_in_theory(&self, values: &MemberValues, [area, length]: [f64; 2]) -> Option<f64> {
+        let (flow, forcing, mode) = (&values.flow, &values.forcing, self.slowest_mode(values)?);
+        let radius = match (forcing.conserved, forcing.drive) {
+            (None, None) => {
+                let rate = excess_rate(flow, mode, area)?;
+                return Some(if flow.growth(area).is_some() { rate } else { self.mobility() * rate });
+            }
+            (Some(Conserved::Area), None) => (area.abs() / PI).sqrt(),
+            (Some(Conserved::Length), None) => length / TAU,
+            _ => return None,
+        };
+        Some(2.0 * self.mobility() * forcing.linear_rate(flow, mode, radius)).filter(|rate| rate.is_finite())
     }
 
     /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².

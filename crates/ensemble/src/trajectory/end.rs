@@ -59,7 +59,11 @@ impl Trajectory<'_> {
         let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         // What happens to a curve at rest takes nothing from its time.
-        let status = if t_relax.is_some() { Status::Relaxed } else { failed.unwrap_or(Status::Unfinished) };
+        let status = match failed {
+            Some(Status::Vanished) => Status::Vanished,
+            _ if t_relax.is_some() => Status::Relaxed,
+            failed => failed.unwrap_or(Status::Unfinished),
+        };
         let (rate, rate_r2) = self.rate().unzip();
         let (origin, unit) = (self.member.origin, self.unit);
         let before = || self.member.nodes.iter().map(|node| *node + origin).collect::<Vec<DVec2>>();
@@ -92,6 +96,7 @@ impl Trajectory<'_> {
             group: std::mem::take(&mut self.member.group),
             points: self.member.nodes.len() as u64,
             wulff_distance,
+            t_vanish: self.t_vanish,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             ..Outcome::default()
         };

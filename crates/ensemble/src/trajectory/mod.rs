@@ -9,10 +9,12 @@ mod end;
 mod events;
 mod outputs;
 mod start;
+mod vanishing;
 mod watch;
 
 use glam::DVec2;
 
+use vanishing::Vanishing;
 use watch::{Watch, aim_at_levels};
 
 use crate::{
@@ -115,6 +117,10 @@ pub struct Trajectory<'a> {
     portrait: bool,
     /// What its flow relaxes curves to.
     equilibrium: Equilibrium,
+    /// Whether it may shrink to a point, driven by a force.
+    vanishing: Option<Vanishing>,
+    /// When it did.
+    t_vanish: Option<f64>,
 }
 
 impl Trajectory<'_> {
@@ -172,6 +178,8 @@ impl Trajectory<'_> {
         (self.served, self.crossed) = (served, crossed);
         self.sweeps = sweeps;
         self.take(counters, &report);
+        // One that is so small goes on because it does not vanish in time.
+        self.vanishing.take_if(|own| own.is_due(&self.report.now));
         Ok(())
     }
 
@@ -185,6 +193,7 @@ impl Trajectory<'_> {
         if creeps || (failed && self.is_timed_too_coarsely()) {
             self.counters.status = Status::Stalled as u32;
         }
+        self.look_whether_it_vanishes();
     }
 
     /// Whether even the shortest step that the clock can count was longer than the curve needed at its start.
@@ -265,6 +274,9 @@ impl Trajectory<'_> {
         let steps = self.counters.steps;
         let mut parameters = self.launch.parameters;
         aim_at_levels(&mut parameters, &self.watches);
+        if let Some(vanishing) = &self.vanishing {
+            vanishing.aim(&mut parameters);
+        }
         let output = self.outputs.get(self.served).map(|output| output.t);
         let goal = match self.time {
             Time::Fixed(clock) => {

@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{
     Course, FIRST_STEP, Time, Trajectory,
+    vanishing::Vanishing,
     watch::{ROUND, Watch, resolution},
 };
 use crate::{
@@ -15,6 +16,7 @@ use crate::{
 use curvelax_curve::polygon;
 use curvelax_flow::{
     flow::Flow,
+    forcing::Forcing,
     scheme::{
         Parameters, State,
         extrapolation::most_order,
@@ -44,7 +46,8 @@ impl<'a> Trajectory<'a> {
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let time_unit = unit.powi(4) / spec.mobility();
         let flow = member.flow.clone().unwrap_or_else(|| spec.typical().flow.into_owned());
-        let parameters = parameters(spec, &flow, &nodes, [unit, time_unit], spec.tolerance_at(precision));
+        let forcing = member.forcing.unwrap_or_else(|| spec.typical().forcing);
+        let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order =
@@ -59,7 +62,7 @@ impl<'a> Trajectory<'a> {
         let clock = time.unit(time_unit);
         launch.parameters.clock_end = spec.final_time() / clock;
         launch.parameters.growth = spec
-            .growth(&flow, start.area)
+            .growth(&flow, &forcing, start.area)
             .map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
             Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
@@ -86,6 +89,8 @@ impl<'a> Trajectory<'a> {
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
+            vanishing: Vanishing::new(flow, forcing, &start, unit, precision),
+            t_vanish: None,
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
@@ -167,10 +172,18 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
 }
 
 /// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
-fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
+fn parameters(
+    spec: &Spec,
+    (flow, forcing): (&Flow, &Forcing),
+    nodes: &[DVec2],
+    [unit, time]: [f64; 2],
+    tolerance: f64,
+) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
+    let mut law = flow.law(unit);
+    forcing.write(&mut law, unit);
     Parameters {
-        law: flow.law(unit),
+        law,
         tau: match spec.pace() {
             Pace::Fixed(Tau::Step(tau)) => tau / time,
             Pace::Fixed(Tau::Auto) => own_tau(rate),
