@@ -8,6 +8,7 @@ use super::{
     Branches, Parameters, State, Status, Workspace, decay,
     dense::{Arc, Fall, LOOKS, RESOLVED, Taken},
     extrapolation::{self, AllShares, SHARED_PARTS},
+    forcing,
     member::{Counters, NEVER, Observed},
     observe::{self, Glance},
     pace::{self, Allowed, Stride},
@@ -206,6 +207,7 @@ impl<N: Number> Team<N> {
         let (mut errors, mut decline) = ([N::of(0.0); 2], [N::of(0.0); 2]);
         if branches.adaptive {
             extrapolation::finish_attempt(state, &mut work.new);
+            forcing::correct(&mut work.new, parameters, branches.law, work.blocks, &mut work.gradients);
         }
         let seen = observe::glance(&state.curve, &work.new, parameters, branches.law, work.blocks);
         if branches.adaptive {

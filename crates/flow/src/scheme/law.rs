@@ -8,6 +8,7 @@ use super::Parameters;
 use crate::{
     crystal::{MOST_WAVES, WAVE},
     flow::{DIFFUSIVITY_WAVES, ENERGY_UNIT, ENERGY_WAVES, MAX_DEGREE},
+    forcing::{CONSERVED, DRIVE, FEEDBACK},
     number::{Number, Real},
 };
 
@@ -20,6 +21,10 @@ pub struct Kind {
     pub energy: [u8; MOST_WAVES],
     /// m of the waves of M, 0 for none.
     pub diffusivity: [u8; MOST_WAVES],
+    /// Whether a driving force acts.
+    pub driven: bool,
+    /// What is kept: 1 the area, 2 the length, 3 both, 0 nothing.
+    pub conserved: u8,
 }
 
 impl Kind {
@@ -41,10 +46,15 @@ impl<T: Real> Parameters<T> {
     pub fn kind_of_law(&self) -> Kind {
         let zero = T::of(0.0);
         let modes = |place: usize| std::array::from_fn(|wave| self.law[place + wave * WAVE].to_f64() as u8);
+        let degree = self.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1);
+        let conserved = self.law[CONSERVED].to_f64() as u8;
         Kind {
-            degree: self.law[..MAX_DEGREE].iter().rposition(|c| *c != zero).map_or(0, |j| j + 1),
+            // A multiplier is a coefficient of k.
+            degree: if conserved == 0 { degree } else { degree.max(1) },
             energy: modes(ENERGY_WAVES),
             diffusivity: modes(DIFFUSIVITY_WAVES),
+            driven: self.law[DRIVE] != zero || self.law[FEEDBACK] != zero,
+            conserved,
         }
     }
 }
@@ -56,7 +66,7 @@ impl<N: Number> Parameters<N> {
         let mut coefficients = [N::of(0.0); MAX_DEGREE];
         coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
         let (energy, diffusivity) = (self.waves(ENERGY_WAVES), self.waves(DIFFUSIVITY_WAVES));
-        Law { coefficients, energy, diffusivity, unit: self.law[ENERGY_UNIT], kind }
+        Law { coefficients, energy, diffusivity, unit: self.law[ENERGY_UNIT], force: N::of(0.0), kind }
     }
 
     /// The waves from this place on: the factors of the real and of the imaginary part of the power.
@@ -79,6 +89,8 @@ pub struct Law<N> {
     diffusivity: [[N; 2]; MOST_WAVES],
     /// Factor of `∮γ ds` in the energy that is reported.
     pub(super) unit: N,
+    /// The force along the inward normal, of this step.
+    pub(super) force: N,
     pub(super) kind: Kind,
 }
 
@@ -104,6 +116,12 @@ impl<N: Number> Law<N> {
     #[inline(always)]
     pub fn phi(&self, k: N) -> N {
         k * k - self.b_over_k(k)
+    }
+
+    /// Adds a multiplier to c₁.
+    #[inline(always)]
+    pub fn tighten(&mut self, by: N) {
+        self.coefficients[0] += by;
     }
 
     #[inline(always)]

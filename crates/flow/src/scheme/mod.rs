@@ -12,6 +12,8 @@
 //! here is over i and i+1. Both systems are written for the increment δ over the step: the right-hand side is
 //! the residual of the old state in node differences, so no digits are lost to the size of x.
 //!
+//! [`forcing`] adds to stages 1 and 3 what acts beside the flow.
+//!
 //! With adaptive steps, [`extrapolation`] combines rows of 1, 2, … J of them into one of order J, [`pace`] chooses the
 //! length and the order and tracks the time, and [`dense`] gives what lies inside a step. [`decay`] records how fast the
 //! excess falls.
@@ -28,6 +30,7 @@ pub mod dense;
 pub mod evolve;
 pub mod extrapolation;
 pub mod forces;
+pub mod forcing;
 pub mod law;
 pub mod member;
 pub mod observe;

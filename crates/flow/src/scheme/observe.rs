@@ -158,7 +158,7 @@ fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
 
 /// `x_{i-1} × x_i`.
 #[inline(always)]
-fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
+pub fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
     let [xm, x, ym, y] = corner(curve, i);
     xm * y - x * ym
 }

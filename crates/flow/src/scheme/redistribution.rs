@@ -3,13 +3,13 @@
 //! From the old state, with `q_i = (r_i + r_{i+1})/2`:
 //!
 //! - `β_i = -(1/r_i)·((k_{i+1}-k_i)/q_i - (k_i-k_{i-1})/q_{i-1}) + b(k_i)`, the paper's eq. (1), by
-//!   [`forces`];
+//!   [`forces`], with what [`forcing`] adds;
 //! - `α_i = α_{i-1} + r_i k_i β_i - r_i B + ω(M - r_i)`, eq. (5), with `B = Σ r k β / L`, `M = L/n`,
 //!   `α_0 = α_n = 0`;
 //! - `r_i ← r_i·exp(τ(-B + ω(M/r_i - 1)))`, eq. (3) for `η = ln r`; without redistribution α = 0 and
 //!   `r_i ← r_i·exp(-τ k_i β_i)`.
 
-use super::{Branches, Curve, Parameters, forces, state::Motion};
+use super::{Branches, Curve, Parameters, forces, forcing, state::Motion};
 use crate::{
     number::Number,
     solver::{Blocks, Ring, Sums},
@@ -36,7 +36,10 @@ pub fn redistribute<N: Number>(
         motion.rkb[i] = rkb;
         sums.add(i, [old.r[i], rkb]);
     }
-    let [length, sum_rkb] = sums.totals();
+    let [length, mut sum_rkb] = sums.totals();
+    if branches.law.is_forced() {
+        sum_rkb = forcing::act(old, p, branches.law, length, blocks, motion);
+    }
     let (mean_rkb, mean_length) = (sum_rkb / length, length / n);
     if branches.redistributed {
         tangential_velocity(old, p, [mean_rkb, mean_length], blocks, motion);

@@ -328,6 +328,8 @@ pub struct Workspace<N> {
     pub curvature: Memory<N, 1>,
     /// The position system and its solver.
     pub position: Memory<N, 2>,
+    /// The gradients of the new curve's area and length, x and y of each, where they are kept.
+    pub gradients: [Ring<N>; 4],
     /// Whether to fill the rows of the systems even if the solver does not need them.
     pub traced: bool,
 }
@@ -345,7 +347,7 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        17 + S::FACTS.numbers_per_node
+        21 + S::FACTS.numbers_per_node
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
@@ -373,6 +375,7 @@ impl<N: Number> Workspace<N> {
             new: Curve::zeros(n),
             curvature,
             position,
+            gradients: std::array::from_fn(|_| ring()),
             traced: false,
         }
     }

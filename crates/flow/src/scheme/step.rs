@@ -1,7 +1,7 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER, forces,
+    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER, forces, forcing,
     position::Position, pull, redistribution, state,
 };
 use crate::{
@@ -102,7 +102,7 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, traced } = work;
+    let Workspace { blocks, motion, new, curvature, position, gradients, traced } = work;
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
@@ -134,6 +134,7 @@ pub fn step_by<N: Number, S: Solves>(
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
     state::advance(0, &old.x, &increments.x, &mut new.x);
     state::advance(1, &old.y, &increments.y, &mut new.y);
+    forcing::correct(new, p, branches.law, *blocks, gradients);
     pull::pull(new, p, branches);
 
     // The second solve counts only if the first one succeeded.
