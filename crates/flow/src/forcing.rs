@@ -7,7 +7,11 @@
 //! F is positive inwards: a circle of radius R under surface diffusion has R(t) = R₀ - F t. λ and p are the Lagrange
 //! multipliers that keep the length and the area.
 
-use std::{f64::consts::PI, fmt, str::FromStr};
+use std::{
+    f64::consts::{PI, TAU},
+    fmt,
+    str::FromStr,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -65,7 +69,7 @@ pub struct Forcing {
     pub drive: Option<Drive>,
     /// What is kept.
     pub conserved: Option<Conserved>,
-    /// The area and the length at which it is kept; of what is not kept, any number.
+    /// The area and the length at which it is kept, 0 if that of the start; of what is not kept, any number.
     pub kept: [f64; 2],
 }
 
@@ -99,6 +103,24 @@ impl Forcing {
     /// Returns whether anything acts beside the flow.
     pub fn acts(&self) -> bool {
         self.drive.is_some() || self.conserved.is_some()
+    }
+
+    /// Returns it with the area and the length of the start where none are given.
+    pub fn kept_from(self, start: [f64; 2]) -> Forcing {
+        let [area, length] = self.kept;
+        let or_start = |given: f64, start: f64| if given == 0.0 { start } else { given };
+        Forcing { kept: [or_start(area, start[0]), or_start(length, start[1])], ..self }
+    }
+
+    /// Returns the radius of the circle at which a curve comes to rest, if that follows from what is kept: by those of the
+    /// circles of its area and of its length.
+    pub fn radius_at_rest(&self, of_area: f64, of_length: f64) -> Option<f64> {
+        let [area, length] = self.kept;
+        match self.conserved? {
+            Conserved::Area => Some(if area == 0.0 { of_area } else { (area / PI).sqrt() }),
+            Conserved::Length => Some(if length == 0.0 { of_length } else { length / TAU }),
+            Conserved::AreaAndLength => None,
+        }
     }
 
     /// Returns dR/dt of a circle.

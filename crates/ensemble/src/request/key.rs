@@ -24,7 +24,7 @@ use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
-    forcing::Drive,
+    forcing::{Conserved, Drive},
     number::Precision,
     solver::Order,
 };
@@ -192,12 +192,16 @@ keys! {
         modes: Modes = Modes { low: 2, high: 8 }, "LO..=HI", Ensemble;
         /// Power p: mode m has standard deviation σ m^-p; or a distribution [default: 1]
         decay: Drawn<f64> = 1.0.into(), "P", Ensemble;
+        /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi A/L^2, 0.05 to
+        /// 1; or a distribution. Needs --conserve area,length [default: as it is]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reduced_area: Option<Drawn<f64>> = None, "V", Ensemble;
         /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos and
         /// sin with the same power [default: amplitude-phase]
         #[serde(skip_serializing_if = "Perturbation::is_default")]
         perturbation: Perturbation = Perturbation::default(), "LAW", Ensemble;
         /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity, --drive,
-        /// --amplitude and --decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
+        /// --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
         /// [default: random]
         #[serde(skip_serializing_if = "Design::is_random")]
         design: Design = Design::default(), "DESIGN", Ensemble;
@@ -218,6 +222,13 @@ keys! {
         /// [default: 0]
         #[serde(skip_serializing_if = "Option::is_none")]
         drive: Option<Drawn<Drive>> = None, "F", Evolution;
+        /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a vesicle: it is
+        /// relaxed when --relax-to of the way of its energy is left [default: neither]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        conserve: Option<Conserved> = None, "WHAT", Evolution;
+        /// The area and the length that are kept; one number if one is [default: those of the polygon at the start]
+        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
+        conserve_at: Option<Vec<f64>> = None, "A,L", Evolution;
         /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in results,
         /// are then in its unit of time [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -17,7 +17,7 @@ pub use crate::request::{
     key::{HelpHeading, OmittedKeys, Spec, SpecKey},
     units::Units,
 };
-use curvelax_flow::forcing::Drive;
+use curvelax_flow::forcing::{Conserved, Drive};
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
@@ -197,7 +197,13 @@ impl Spec {
 
     /// Whether a member ends when it is relaxed.
     pub fn stops_when_relaxed(&self) -> bool {
-        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto) && !self.may_vanish())
+        self.stop_when_relaxed
+            .unwrap_or(self.t_end == Some(FinalTime::Auto) && !(self.may_vanish() || self.keeps_both()))
+    }
+
+    /// Whether both area and length are kept, so that the end is no circle, and known only when it is reached.
+    pub fn keeps_both(&self) -> bool {
+        self.conserve == Some(Conserved::AreaAndLength) || self.sweep.has("conserve")
     }
 
     /// Whether members are driven inwards by a constant force, at least some: they are followed until they vanish.
@@ -224,9 +230,10 @@ impl Spec {
     }
 
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
-    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals there is no other.
+    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals, and where
+    /// something is kept, there is no other.
     pub fn is_geometric(&self) -> bool {
-        self.form == Some(PositionForm::Geometric) || self.has_crystals()
+        self.form == Some(PositionForm::Geometric) || self.has_crystals() || self.conserve.is_some()
     }
 
     /// Whether energy or mobility depend on the direction.
@@ -328,6 +335,9 @@ mod tests {
             "energy",
             "diffusivity",
             "drive",
+            "conserve",
+            "conserve-at",
+            "reduced-area",
             "outlines",
             "group-by",
             "interpolate",

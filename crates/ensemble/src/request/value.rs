@@ -15,7 +15,7 @@ use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
-    forcing::Drive,
+    forcing::{Conserved, Drive},
     number::Precision,
     solver::{MULTIGRID, Order},
 };
@@ -109,7 +109,7 @@ values! { Takes::Number, str::parse;
     Drawn<Diffusivity>, Drawn<Drive>, Drawn<Energy>, Drawn<Flow>, Drawn<Shape>, Drawn<f64>, FinalTime, Modes, Omega, Pull,
     Shard, Sor, Tau,
 }
-values! { Takes::Text, str::parse; Units }
+values! { Takes::Text, str::parse; Conserved, Units }
 values! { Takes::Text, |word: &str| Ok(word.to_owned()); String }
 values! { Takes::Switch, |word: &str| word.parse().map_err(|_| "neither true nor false".to_string()); bool }
 

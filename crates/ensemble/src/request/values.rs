@@ -2,7 +2,8 @@
 //!
 //! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
-//! through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive.
+//! through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive,
+//! reduced area.
 
 use std::{
     borrow::Cow,
@@ -18,6 +19,7 @@ use crate::{
 use curvelax_base::{
     error::{Error, Result, echo},
     random::{Design, Distribution, DrawAddress, MAX_SOBOL},
+    text::number,
 };
 use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::{
@@ -34,11 +36,13 @@ const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 /// The keys whose values may be drawn.
-const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity", "drive"];
+const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity", "drive", "reduced-area"];
 /// Their number.
-pub(crate) const DRAWN: usize = 7;
+pub(crate) const DRAWN: usize = 8;
 /// Those that are numbers, and so have one.
-const NUMBERS: [&str; 2] = ["amplitude", "decay"];
+const NUMBERS: [&str; 3] = ["amplitude", "decay", "reduced-area"];
+/// Reduced areas: a circle has 1, and thin curves have no room for nodes.
+const REDUCED_AREAS: std::ops::RangeInclusive<f64> = 0.05..=1.0;
 /// Bits of the places of a key.
 const PLACE_BITS: u32 = 16;
 
@@ -55,6 +59,8 @@ pub struct MemberValues<'a> {
     pub amplitude: f64,
     /// p of the perturbation.
     pub decay: f64,
+    /// 4πA/L² to which its curve is stretched.
+    pub reduced_area: Option<f64>,
 }
 
 impl Spec {
@@ -70,12 +76,20 @@ impl Spec {
             forcing: self.forcing(self.drive.as_ref().map(|drive| *drive.typical())),
             amplitude: *self.amplitude.typical(),
             decay: *self.decay.typical(),
+            reduced_area: self.reduced_area.as_ref().map(|drawn| *drawn.typical()),
         }
     }
 
     /// What acts beside the flow, with this driving force, whose time becomes that of unit mobility.
     fn forcing(&self, drive: Option<Drive>) -> Forcing {
-        Forcing { drive: drive.map(|drive| drive.scaled(1.0 / self.mobility())), ..Forcing::default() }
+        let drive = drive.map(|drive| drive.scaled(1.0 / self.mobility()));
+        let kept = match (self.conserve, self.conserve_at.as_deref()) {
+            (Some(Conserved::Area), Some([area])) => [*area, 0.0],
+            (Some(Conserved::Length), Some([length])) => [0.0, *length],
+            (_, Some([area, length])) => [*area, *length],
+            _ => [0.0; 2],
+        };
+        Forcing { drive, conserved: self.conserve, kept }
     }
 
     /// The flow, with the energy and the mobility if they depend on the direction.
@@ -137,7 +151,7 @@ impl Spec {
 
     /// Whether each member has a law of motion of its own.
     pub fn has_drawn_flow(&self) -> bool {
-        let [_, flow, _, _, energy, diffusivity, drive] = self.distributions();
+        let [_, flow, _, _, energy, diffusivity, drive, _] = self.distributions();
         [flow, energy, diffusivity, drive].into_iter().any(|of_key| !of_key.is_empty())
     }
 
@@ -221,7 +235,18 @@ impl Spec {
             Some(told(drawn.0, drawn.1, reason?))
         };
         let of_motion = of_flow().or_else(of_energy).or_else(of_diffusivity).or_else(of_drive);
-        of_shape().or(of_motion).or_else(of_law)
+        of_shape().or(of_motion).or_else(of_law).or_else(|| self.refusal_of_reduced_area())
+    }
+
+    /// The same for the reduced area.
+    fn refusal_of_reduced_area(&self) -> Option<String> {
+        let drawn = self.reduced_area.as_ref()?;
+        let of: Vec<&Distribution> = drawn.distributions().iter().collect();
+        let reason = refusal(&of, |numbers| match drawn.at(numbers) {
+            Ok(reduced) => check_reduced_area(reduced).err().map(|error| error.to_string()),
+            Err(message) => Some(message),
+        });
+        Some(format!("--reduced-area {}: {}", echo(drawn), reason?))
     }
 
     /// Checks the values of `member`, as for [`Spec::values`].
@@ -230,6 +255,7 @@ impl Spec {
     /// [`Error::Request`] for values that cannot be.
     pub(crate) fn check_values(&self, member: u64) -> Result<()> {
         let values = self.values(member)?;
+        values.reduced_area.map_or(Ok(()), check_reduced_area)?;
         RadialLaw::new(values.amplitude, self.modes, values.decay).map(drop)
     }
 
@@ -243,7 +269,7 @@ impl Spec {
 
     /// The distributions of each key.
     pub(crate) fn distributions(&self) -> [&[Distribution]; DRAWN] {
-        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, .. } = self;
+        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, reduced_area, .. } = self;
         let energy = energy.as_ref().map_or(&[][..], Drawn::distributions);
         let diffusivity = diffusivity.as_ref().map_or(&[][..], Drawn::distributions);
         [
@@ -254,6 +280,7 @@ impl Spec {
             energy,
             diffusivity,
             drive.as_ref().map_or(&[][..], Drawn::distributions),
+            reduced_area.as_ref().map_or(&[][..], Drawn::distributions),
         ]
     }
 
@@ -266,11 +293,12 @@ impl Spec {
     }
 
     fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
-        let [shape, flow, amplitude, decay, energy, diffusivity, drive] = self.numbers(uniform);
+        let [shape, flow, amplitude, decay, energy, diffusivity, drive, reduced] = self.numbers(uniform);
         let of_energy = self.energy.as_ref().map(|drawn| own("energy", drawn, &energy)).transpose()?;
         let of_diffusivity =
             self.diffusivity.as_ref().map(|drawn| own("diffusivity", drawn, &diffusivity)).transpose()?;
         let of_drive = self.drive.as_ref().map(|drawn| own("drive", drawn, &drive)).transpose()?;
+        let of_reduced = self.reduced_area.as_ref().map(|drawn| own("reduced-area", drawn, &reduced)).transpose()?;
         let flow = own("flow", &self.flow, &flow)?;
         Ok(MemberValues {
             shape: own("shape", &self.shape, &shape)?,
@@ -278,6 +306,7 @@ impl Spec {
             forcing: self.forcing(of_drive.map(|of| *of)),
             amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
             decay: *own("decay", &self.decay, &decay)?,
+            reduced_area: of_reduced.map(|of| *of),
         })
     }
 
@@ -298,6 +327,21 @@ impl Spec {
     }
 }
 
+/// Checks a reduced area.
+///
+/// # Errors
+/// [`Error::Request`] if no curve to stretch has it.
+pub(crate) fn check_reduced_area(reduced: f64) -> Result<()> {
+    match REDUCED_AREAS.contains(&reduced) {
+        true => Ok(()),
+        false => {
+            let (low, high) = (number(*REDUCED_AREAS.start()), number(*REDUCED_AREAS.end()));
+            let allowed = format!("use a number from {low} to {high}");
+            Err(Error::value("reduced-area", number(reduced), "not 4 pi A/L^2 of a curve that nodes resolve", &allowed))
+        }
+    }
+}
+
 /// [`Flow::excess_rate`]. That of a crystal takes a millisecond, so the last one is kept: most members have the same.
 fn excess_rate(flow: &Flow, mode: u32, area: f64) -> Option<f64> {
     static LAST: Mutex<Option<(Crystal, u32, Option<f64>)>> = Mutex::new(None);
@@ -314,7 +358,7 @@ fn excess_rate(flow: &Flow, mode: u32, area: f64) -> Option<f64> {
 /// The names of the numbers that are drawn, so many for each key.
 pub(crate) fn drawn_names(counts: [usize; DRAWN]) -> Vec<String> {
     let name = |key: usize, rank: usize| match KEYS[key] {
-        key if NUMBERS.contains(&key) => key.into(),
+        key if NUMBERS.contains(&key) => key.replace('-', "_"),
         key => format!("{key}_{}", rank + 1),
     };
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
@@ -352,8 +396,7 @@ impl Spec {
                 let rate = excess_rate(flow, mode, area)?;
                 return Some(if flow.growth(area).is_some() { rate } else { self.mobility() * rate });
             }
-            (Some(Conserved::Area), None) => (area.abs() / PI).sqrt(),
-            (Some(Conserved::Length), None) => length / TAU,
+            (Some(_), None) => forcing.radius_at_rest((area.abs() / PI).sqrt(), length / TAU)?,
             _ => return None,
         };
         Some(2.0 * self.mobility() * forcing.linear_rate(flow, mode, radius)).filter(|rate| rate.is_finite())

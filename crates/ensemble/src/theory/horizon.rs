@@ -117,7 +117,9 @@ impl CurveScale {
     /// The radius from which the theory starts.
     pub fn first_radius(&self, flow: &Flow, forcing: &Forcing) -> f64 {
         match flow {
-            _ if forcing.conserved == Some(Conserved::Area) => self.radius,
+            _ if forcing.conserved.is_some() => {
+                forcing.radius_at_rest(self.radius, self.radius_of_length).unwrap_or(self.radius_of_length)
+            }
             Flow::SurfaceDiffusion => (self.radius * self.radius_of_length).sqrt(),
             _ => self.radius_of_length,
         }

@@ -21,6 +21,9 @@ const MARGIN: f64 = 6.0;
 const PERTURBED: f64 = 4.0;
 /// The cap for members that vanish over the life of a circle of the area of the curve.
 const VANISHED_MARGIN: f64 = 2.0;
+/// The same for members that keep area and length, in units of the fourth power of the radius of the circle of that length: the
+/// energy of a vesicle of reduced area 0.64 is then at rest to 10⁻⁶.
+const SETTLED: f64 = 2.0;
 /// Bits of a cap, which nobody needs to a digit: few enough that it is the same on every machine.
 const CAP_BITS: u32 = 8;
 /// R⁴ of the curve for which the default numbers are meant, the paper's 2:1 ellipse, and the factor either way within
@@ -112,8 +115,8 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
 
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
     let values = spec.typical();
-    // A driven curve goes on when it has relaxed.
-    if values.forcing.drive.is_some() {
+    // A driven curve goes on when it has relaxed, and of one that keeps both theory knows nothing.
+    if values.forcing.drive.is_some() || spec.keeps_both() {
         return None;
     }
     let (t_end, expected) = (spec.final_time(), expected(spec, &values, scale));
@@ -147,6 +150,9 @@ fn cap(spec: &Spec, scales: &[CurveScale]) -> f64 {
 
 /// That time for members with these values: when they have relaxed, or vanished if that comes for sure.
 fn own_cap(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
+    if spec.keeps_both() {
+        return SETTLED * scale.first_radius(&values.flow, &values.forcing).powi(4) / spec.mobility();
+    }
     match life(spec, values, scale) {
         Some(t) => t,
         // That of a curve which is not simple is no time that it needs.

@@ -8,12 +8,15 @@
 mod end;
 mod events;
 mod outputs;
+mod settling;
 mod start;
 mod vanishing;
 mod watch;
 
 use glam::DVec2;
 
+use settling::Settling;
+pub(crate) use settling::settling_times;
 use vanishing::Vanishing;
 use watch::{Watch, aim_at_levels};
 
@@ -56,6 +59,8 @@ enum Course {
     Unresolved,
     /// It is not a simple curve: whatever its excess, it does not relax to a circle.
     Immersed,
+    /// It keeps its excess; its energy is followed to the end.
+    Settling,
 }
 
 /// How a member's time advances.
@@ -121,6 +126,10 @@ pub struct Trajectory<'a> {
     vanishing: Option<Vanishing>,
     /// When it did.
     t_vanish: Option<f64>,
+    /// Its energy, if that decides on its relaxation.
+    settling: Option<Settling>,
+    /// Whether it keeps its area or its length.
+    conserved: bool,
 }
 
 impl Trajectory<'_> {
@@ -148,6 +157,7 @@ impl Trajectory<'_> {
             crossed: self.crossed,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             look_at: self.launch.parameters.look_at,
+            energies: self.settling.as_ref().map_or(Vec::new(), |own| own.energies.clone()),
         }
     }
 
@@ -156,7 +166,8 @@ impl Trajectory<'_> {
     /// # Errors
     /// [`Error::Request`] if a different member was paused.
     pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
-        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at } = paused;
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at, energies } =
+            paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
         let served = usize::try_from(served).unwrap_or(usize::MAX);
         let others = events.len() != self.watches.len();
@@ -176,6 +187,9 @@ impl Trajectory<'_> {
         (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
         (self.rows, self.frames) = (rows, frames);
         (self.served, self.crossed) = (served, crossed);
+        if let Some(own) = &mut self.settling {
+            own.energies = energies;
+        }
         self.sweeps = sweeps;
         self.take(counters, &report);
         // One that is so small goes on because it does not vanish in time.

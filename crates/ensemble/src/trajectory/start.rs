@@ -4,6 +4,7 @@ use glam::DVec2;
 
 use super::{
     Course, FIRST_STEP, Time, Trajectory,
+    settling::Settling,
     vanishing::Vanishing,
     watch::{ROUND, Watch, resolution},
 };
@@ -47,6 +48,7 @@ impl<'a> Trajectory<'a> {
         let time_unit = unit.powi(4) / spec.mobility();
         let flow = member.flow.clone().unwrap_or_else(|| spec.typical().flow.into_owned());
         let forcing = member.forcing.unwrap_or_else(|| spec.typical().forcing);
+        let forcing = forcing.kept_from([polygon::signed_area(&member.nodes), polygon::length(&member.nodes)]);
         let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
@@ -56,7 +58,10 @@ impl<'a> Trajectory<'a> {
         let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
         let start = Observables::new(&launch.report.now, turning, unit);
         let limit = spec.threshold(member.given_excess.unwrap_or(start.excess));
-        let course = Course::of(start.excess, turning, limit, precision);
+        let course = match spec.keeps_both() {
+            true => Course::Settling,
+            false => Course::of(start.excess, turning, limit, precision),
+        };
         set_thresholds(&mut launch, course, start.excess, limit, precision);
         let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
         let clock = time.unit(time_unit);
@@ -91,6 +96,8 @@ impl<'a> Trajectory<'a> {
             equilibrium: flow.equilibrium(),
             vanishing: Vanishing::new(flow, forcing, &start, unit, precision),
             t_vanish: None,
+            settling: Settling::of(spec, &start),
+            conserved: forcing.conserved.is_some(),
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
@@ -118,7 +125,7 @@ impl Course {
 /// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.
 fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, precision: Precision) {
     let (resolution, parameters) = (resolution(precision), &mut launch.parameters);
-    let reachable = course != Course::Immersed && excess > ROUND;
+    let reachable = course != Course::Immersed && course != Course::Settling && excess > ROUND;
     let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
     parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };
     parameters.half_at = threshold(0.5 * excess);

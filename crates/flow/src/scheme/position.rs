@@ -54,7 +54,11 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
                     residual_of_old(off, self.old.x.offsets_of_places(i)),
                     residual_of_old(off, self.old.y.offsets_of_places(i)),
                 ];
-                if self.motion.law.kind.is_forced() { forces::pushed(residual, self.old, self.motion, q, i) } else { residual }
+                if self.motion.law.kind.is_forced() {
+                    forces::pushed(residual, self.old, self.motion, q, i)
+                } else {
+                    residual
+                }
             }
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }

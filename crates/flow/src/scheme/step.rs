@@ -1,8 +1,8 @@
 //! One step of the paper's scheme, from an old curve to the new one in the workspace. Twin of `shaders/step.wgsl`.
 
 use super::{
-    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER, forces, forcing,
-    position::Position, pull, redistribution, state,
+    Branches, Curve, Increments, Parameters, Workspace, curvature::Curvature, extrapolation::MOST_ORDER, forces,
+    forcing, position::Position, pull, redistribution, state,
 };
 use crate::{
     number::{Mask, Number, Real},

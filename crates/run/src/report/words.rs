@@ -47,6 +47,8 @@ pub fn describe(spec: &Spec) -> String {
         ("energy", spec.energy.as_ref().map_or(String::new(), |energy| format!("energy {energy}"))),
         ("diffusivity", spec.diffusivity.as_ref().map_or(String::new(), |of| format!("diffusivity {of}"))),
         ("drive", spec.drive.as_ref().map_or(String::new(), |drive| format!("drive {drive}"))),
+        ("conserve", spec.conserve.map_or(String::new(), |what| format!("{what} kept"))),
+        ("reduced-area", spec.reduced_area.as_ref().map_or(String::new(), |of| format!("reduced area {of}"))),
         ("amplitude", drawn("amplitude", &spec.amplitude)),
         ("decay", drawn("decay", &spec.decay)),
         ("perturbation", perturbation.into()),

@@ -87,6 +87,10 @@ pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
         let problem = "the referee solves for flows without a driving force";
         return Err(Error::value("drive", drive, problem, "leave it out"));
     }
+    if let Some(conserved) = spec.conserve {
+        let problem = "the referee solves for flows that keep nothing";
+        return Err(Error::value("conserve", conserved, problem, "leave it out"));
+    }
     let (point, own) = family.curve(index)?;
     let referee = Referee::new(point, &own.unwrap_or_else(|| spec.typical().flow.into_owned()))?;
     let truth = referee.time_of_excess(spec.threshold(referee.excess()))?;
