@@ -13,7 +13,7 @@ use std::{
     str::FromStr,
 };
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use curvelax_base::text::number;
 
@@ -36,8 +36,8 @@ pub const KEPT_AREA: usize = DRIVE + 4;
 pub const KEPT_LENGTH: usize = DRIVE + 5;
 
 /// A driving force along the normal, positive inwards, in units of length/time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "String")]
 pub enum Drive {
     /// F, the same everywhere and always.
     Constant(f64),
@@ -182,6 +182,16 @@ impl fmt::Display for Drive {
         match self {
             Drive::Constant(force) => write!(f, "{}", number(*force)),
             Drive::Feedback { gain, area } => write!(f, "feedback:{},{}", number(*gain), number(*area)),
+        }
+    }
+}
+
+/// A constant force is a number.
+impl Serialize for Drive {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Drive::Constant(force) => serializer.serialize_f64(*force),
+            Drive::Feedback { .. } => serializer.collect_str(self),
         }
     }
 }

@@ -304,7 +304,16 @@ mod tests {
             design: Design::Sobol,
             ..Spec::default()
         };
-        for spec in [spec, adaptive, own, drawn, Spec::default()] {
+        let driven = Spec { drive: Some("0.5".parse().unwrap()), ..Spec::default() };
+        let fed_back = Spec { drive: Some("feedback:uniform(1..2),3".parse().unwrap()), ..Spec::default() };
+        let kept = Spec {
+            flow: Flow::Willmore.into(),
+            conserve: Some(Conserved::AreaAndLength),
+            conserve_at: Some(vec![3.0, 9.5]),
+            reduced_area: Some("uniform(0.5..0.9)".parse().unwrap()),
+            ..Spec::default()
+        };
+        for spec in [spec, adaptive, own, drawn, driven, fed_back, kept, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
         }

@@ -22,8 +22,8 @@ const PERTURBED: f64 = 4.0;
 /// The cap for members that vanish over the life of a circle of the area of the curve.
 const VANISHED_MARGIN: f64 = 2.0;
 /// The same for members that keep area and length, in units of the fourth power of the radius of the circle of that length: the
-/// energy of a vesicle of reduced area 0.64 is then at rest to 10⁻⁶.
-const SETTLED: f64 = 2.0;
+/// energy of a 3:1 ellipse is at rest to 10⁻⁷ at a tenth of that.
+const SETTLED: f64 = 0.5;
 /// Bits of a cap, which nobody needs to a digit: few enough that it is the same on every machine.
 const CAP_BITS: u32 = 8;
 /// R⁴ of the curve for which the default numbers are meant, the paper's 2:1 ellipse, and the factor either way within
