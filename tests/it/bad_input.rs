@@ -92,7 +92,7 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--conserve", "energy", "area, length, or area,length"),
         ("--conserve-at", "wide", "not a number"),
         ("--reduced-area", "low", "not a number"),
-        ("--drive", "up", "`up` is not a number"),
+        ("--drive", "up", "`up` is not a finite number"),
         ("--drive", "1,2", "drive takes one force, or feedback:C,A0"),
         ("--drive", "feedback:1,-2", "feedback to an area of -2, which must be above 0"),
         ("--sampling", "arc", "arclength"),

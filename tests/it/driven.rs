@@ -6,7 +6,7 @@ use crate::common::program::{Row, column, number, run};
 
 /// One unperturbed curve with these flags.
 fn one(flags: &str) -> Row {
-    run(&format!("{flags} --amplitude 0 --curves 1 --adaptive=1e-4")).summary().remove(0)
+    run(&format!("{flags} --amplitude 0 --curves 1 --adaptive=1e-4 --pull auto")).summary().remove(0)
 }
 
 #[test]
@@ -24,16 +24,16 @@ fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
         let (t, end) = (number(&row, "t_vanish"), number(&row, "t_end"));
         assert_eq!(row["status"], "vanished", "{flags}");
         assert!((t * force / radius - 1.0).abs() < 1e-3, "{flags}: {t}");
-        // It was followed to a twentieth of its length, and not much beyond.
+        // It was followed to a quarter of its length, and not much beyond.
         let left = number(&row, "length_end") / number(&row, "length_start");
-        assert!(end < t && (0.01..=0.05).contains(&left), "{flags}: {end} {left}");
+        assert!(end < t && (0.1..=0.25).contains(&left), "{flags}: {end} {left}");
     }
 }
 
 #[test]
 fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_one_without_a_force_singular_as_ever() {
-    let row = one("--shape circle:1 --drive 0.5 --t-end 1.95 --relax-at 1e-12");
-    assert_eq!((&*row["status"], &*row["t_vanish"], number(&row, "t_end")), ("relaxed", "", 1.95));
+    let row = one("--shape circle:1 --drive 0.5 --t-end 1.7 --relax-at 1e-12");
+    assert_eq!((&*row["status"], &*row["t_vanish"], number(&row, "t_end")), ("relaxed", "", 1.7));
     let row = one("--shape flower:3:0.1 --drive 0.5 --t-end 0.01");
     assert_eq!((&*row["status"], &*row["t_vanish"]), ("unfinished", ""));
     let row = one("--shape circle:1 --drive -0.5 --t-end 0.5");
@@ -58,7 +58,7 @@ fn a_feedback_brings_the_area_to_its_own() {
 
 #[test]
 fn the_times_of_driven_members_have_statistics_of_their_own() {
-    let common = "--shape circle:1 --amplitude 0 --points 40 --adaptive --t-end auto";
+    let common = "--shape circle:1 --amplitude 0 --points 40 --adaptive --pull auto --t-end auto";
     let done = run(&format!("{common} --curves 7 --drive uniform(0.4..0.8)"));
     let (rows, forces) = (done.summary(), column(&done.rows("members.csv"), "drive_1"));
     for (row, force) in rows.iter().zip(&forces) {
@@ -80,7 +80,7 @@ fn the_times_of_driven_members_have_statistics_of_their_own() {
 #[test]
 fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     let done = run(
-        "--shape ellipse:2,1 --drive 0.5 --amplitude 0 --curves 1 --adaptive=1e-4 --t-end auto --event small=length<=0.06*start",
+        "--shape ellipse:2,1 --drive 0.5 --amplitude 0 --curves 1 --adaptive=1e-4 --pull auto --t-end auto --event small=length<=0.3*start",
     );
     let row = &done.summary()[0];
     let (t, circle) = (number(row, "t_vanish"), f64::sqrt(2.0) / 0.5);
@@ -88,14 +88,14 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     // It relaxed on its way.
     assert!((0.5..2.0).contains(&number(row, "t_relax")));
     let small = number(&done.rows("events.csv")[0], "t");
-    assert!(small < number(row, "t_end") && small > 0.8 * t, "{small}");
+    assert!(small < number(row, "t_end") && small > 0.6 * t, "{small}");
     // The area falls at the rate F L, and theory has no rate.
     assert_eq!(done.rows("rates.csv")[0]["rate_theory"], "");
 }
 
 #[test]
 fn members_that_vanish_before_they_relax_are_censored_then() {
-    let done = run("--shape ellipse:2,1 --drive 6 --curves 8 --adaptive --t-end auto --points 64");
+    let done = run("--shape ellipse:2,1 --drive 6 --curves 8 --adaptive --pull auto --t-end auto --points 64");
     let rows = done.summary();
     let early = |row: &&Row| row["t_relax"].is_empty();
     assert!(rows.iter().any(|row| row["status"] == "vanished"));

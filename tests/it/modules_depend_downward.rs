@@ -28,6 +28,7 @@ const LAYERS: [&str; 46] = [
     "flow/crystal",
     "flow/equilibrium",
     "flow/flow",
+    "flow/forcing",
     "flow/solver",
     "flow/scheme",
     "flow",

@@ -24,8 +24,9 @@ fn what_is_kept_is_kept_and_the_energy_is_that_of_the_spectral_program() {
                 let [start, end] = ["start", "end"].map(|when| number(&row, &format!("{what}_{when}")));
                 assert!((end / start - 1.0).abs() < 1e-7, "{kept}: {what} {start} {end}");
             }
+            // It falls to rest, and then stays within the tolerance of the steps.
             let energies = column(&series, "energy");
-            assert!(energies.is_sorted_by(|before, after| *after <= before * (1.0 + 1e-5)), "{kept}");
+            assert!(energies.is_sorted_by(|before, after| *after <= before * (1.0 + 1e-4)), "{kept}");
             let reduced = 4.0 * PI * number(&row, "area_end") / number(&row, "length_end").powi(2);
             assert!((number(&row, "reduced_area") - reduced).abs() < 1e-12);
             (number(&row, "energy_end") / energy - 1.0).abs()
@@ -71,7 +72,7 @@ fn a_vesicle_is_relaxed_when_a_hundredth_of_the_way_of_its_energy_is_left() {
     // Without enough time it is not known, and the curve is biconcave.
     let (early, _) = ellipse("3,1", "--conserve area,length --t-end 0.05", 100);
     assert_eq!((&*early["status"], &*early["t_relax"]), ("unfinished", ""));
-    assert!(number(row, "k_min") < -0.1 && done.rows("rates.csv")[0]["rate"].is_empty());
+    assert!(number(row, "k_min") < -0.1 && row["rate"].is_empty());
 }
 
 #[test]

@@ -69,8 +69,29 @@ pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
     let scale = &scales[0];
     let rate = rate(spec, scale);
     let (omega, tau) = (own_omega(rate), own_tau(rate));
-    let all = [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale), strong_crystal(spec)];
+    let all = [
+        far_omega(spec, omega),
+        far_tau(spec, tau),
+        far_end(spec, scale),
+        strong_crystal(spec),
+        not_followed(spec, scale),
+    ];
     all.into_iter().flatten().collect()
+}
+
+fn not_followed(spec: &Spec, scale: &CurveScale) -> Option<String> {
+    let values = spec.typical();
+    let life = vanishes_after(&values.flow, &values.forcing, scale.radius)? / spec.mobility();
+    if !scale.simple || life > spec.final_time() {
+        return None;
+    }
+    let (life, drive) = (short(life), spec.drive.as_ref()?);
+    let problem = match (spec.pace(), spec.pull) {
+        (Pace::Fixed(_), _) => "steps of one length do not follow them to it: use --adaptive --pull auto",
+        (Pace::Adaptive(_), Pull::Rate(0.0)) => "without --pull auto their lengths drift on the way",
+        _ => return None,
+    };
+    Some(format!("--drive {drive}: members vanish at about {life}, and {problem}"))
 }
 
 fn strong_crystal(spec: &Spec) -> Option<String> {

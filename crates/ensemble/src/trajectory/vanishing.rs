@@ -1,11 +1,13 @@
 //! Members that a driving force shrinks to a point.
 //!
 //! The steps that follow a curve to a point are ever shorter. It is therefore followed to a share of its length, at which
-//! it pauses as for an [event](super::events). By then it is round, since its relaxation time falls as the fourth power of its
+//! it pauses as for an event. By then it is round, since its relaxation time falls as the fourth power of its
 //! radius and its life as the first, and what is left is the [life of a circle](vanishes_after).
+//!
+//! An adaptive step must not pass the end of that life: nodes would cross the centre, and the curve would grow again, upside
+//! down. Steps therefore end where half of what is left has passed, and again at half of the rest.
 
-use super::Trajectory;
-use crate::{Observables, Status, theory::vanishing::vanishes_after};
+use crate::{Observables, theory::vanishing::vanishes_after};
 use curvelax_flow::{
     flow::Flow,
     forcing::Forcing,
@@ -13,8 +15,10 @@ use curvelax_flow::{
     scheme::{Parameters, member::Observed},
 };
 
-/// Share of the length of a curve at which it ends. A force of 10/R³ still makes it round by then.
-const LEFT: f64 = 0.05;
+/// Share of the length of a curve at which it ends. With a force of 10/R³ a mode 2 has fallen by a factor e²⁵ by then.
+const LEFT: f64 = 0.25;
+/// The part of the life of a curve after which steps end.
+const PART: f64 = 0.5;
 
 /// A member that may vanish.
 #[derive(Clone, Debug)]
@@ -23,6 +27,8 @@ pub(super) struct Vanishing {
     forcing: Forcing,
     /// The length at which it is decided, in the member's unit, a number of the run's precision.
     level: f64,
+    /// When half of what was left will have passed, in the member's unit; infinite if it does not vanish.
+    pub(super) until: f64,
 }
 
 impl Vanishing {
@@ -35,7 +41,18 @@ impl Vanishing {
         precision: Precision,
     ) -> Option<Vanishing> {
         let may = forcing.drive.is_some() && start.turning.abs() == 1;
-        may.then(|| Vanishing { flow, forcing, level: precision.rounded(LEFT * start.length / unit) })
+        may.then(|| {
+            let level = precision.rounded(LEFT * start.length / unit);
+            let mut own = Vanishing { flow, forcing, level, until: 0.0 };
+            own.look_ahead(0.0, start, unit);
+            own
+        })
+    }
+
+    /// Sets the time of the next look, from the time `now` of a curve.
+    pub(super) fn look_ahead(&mut self, now: f64, at: &Observables, unit: f64) {
+        let left = self.left(at).map(|left| left / unit.powi(4));
+        self.until = left.map_or(f64::INFINITY, |left| now + PART * left);
     }
 
     /// Lets the member pause at the level.
@@ -48,26 +65,10 @@ impl Vanishing {
         now.length <= self.level
     }
 
-    /// The time that is left to a curve of this length and area, for unit mobility. The area falls at the rate F times the length,
-    /// so 2A/L is the radius that lasts as long.
-    fn left(&self, length: f64, area: f64) -> Option<f64> {
-        vanishes_after(&self.flow, &self.forcing, 2.0 * area / length)
-    }
-}
-
-impl Trajectory<'_> {
-    /// Ends the member if it is at the length at which that is decided, and vanishes before its final time.
-    pub(super) fn look_whether_it_vanishes(&mut self) {
-        let due = |own: &mut Vanishing| self.counters.status == 0 && own.is_due(&self.report.now);
-        let Some(own) = self.vanishing.take_if(due) else { return };
-        let now = Observables::new(&self.report.now, 1.0, self.unit);
-        // The unit of time over that of length to the fourth is the inverse mobility.
-        let inverse_mobility = self.time_unit / self.unit.powi(4);
-        let at = own.left(now.length, now.area.abs()).map(|left| self.now() + left * inverse_mobility);
-        self.t_vanish = at.filter(|t| *t <= self.t_end);
-        if self.t_vanish.is_some() {
-            self.counters.status = Status::Vanished as u32;
-        }
+    /// The time that is left to a curve, for unit mobility. Its area falls at the rate F times its length, so 2A/L is the radius
+    /// that lasts as long.
+    pub(super) fn left(&self, at: &Observables) -> Option<f64> {
+        vanishes_after(&self.flow, &self.forcing, 2.0 * at.area.abs() / at.length)
     }
 }
 
@@ -76,8 +77,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_driven_simple_curve_pauses_at_a_twentieth_of_its_length() {
-        let start = Observables { length: 8.0, turning: 1, ..Observables::default() };
+    fn a_driven_simple_curve_pauses_at_a_quarter_of_its_length() {
+        let start = Observables { length: 8.0, area: 4.0, turning: 1, ..Observables::default() };
         let of = |drive: Option<&str>, start: &Observables| {
             let forcing = Forcing { drive: drive.map(|drive| drive.parse().unwrap()), ..Forcing::default() };
             Vanishing::new(Flow::SurfaceDiffusion, forcing, start, 2.0, Precision::F32)
@@ -85,15 +86,18 @@ mod tests {
         let own = of(Some("0.5"), &start).unwrap();
         let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
         own.aim(&mut parameters);
-        assert_eq!((parameters.watched, parameters.low_length), (1.0, f64::from(0.2_f32)));
+        assert_eq!((parameters.watched, parameters.low_length), (1.0, 1.0));
+        // 2A/L = 1 lasts to t = 2, in units of the fourth power of 2.
+        assert!((own.until - 1.0 / 16.0).abs() < 1e-12);
         // An event at a longer length comes first.
         parameters.low_length = 3.0;
         own.aim(&mut parameters);
         assert_eq!(parameters.low_length, 3.0);
         let at = |length| Observed { length, ..Observed::default() };
-        assert!(own.is_due(&at(0.1)) && !own.is_due(&at(0.3)));
+        assert!(own.is_due(&at(0.9)) && !own.is_due(&at(1.1)));
         let radius = 0.7_f64;
-        let left = own.left(std::f64::consts::TAU * radius, std::f64::consts::PI * radius * radius).unwrap();
+        let (length, area) = (std::f64::consts::TAU * radius, std::f64::consts::PI * radius * radius);
+        let left = own.left(&Observables { length, area, ..start }).unwrap();
         assert!((left - 1.4).abs() < 1e-12, "{left}");
         assert!(of(None, &start).is_none() && of(Some("0.5"), &Observables { turning: 0, ..start }).is_none());
     }

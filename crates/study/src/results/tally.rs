@@ -175,15 +175,15 @@ pub struct EventTally {
 
 /// What decides on how members are counted.
 #[derive(Clone, Copy, Debug)]
-struct Kind {
+struct Counted {
     refined: bool,
     stops: bool,
     driven: bool,
 }
 
 impl CellTally {
-    fn add(&mut self, outcome: &Outcome, kind: Kind) -> Result<()> {
-        let Kind { refined, stops, driven } = kind;
+    fn add(&mut self, outcome: &Outcome, counted: Counted) -> Result<()> {
+        let Counted { refined, stops, driven } = counted;
         let CellTally { counts, times, others, late, area, rates, limits, judged, events, vanishing, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
@@ -316,16 +316,16 @@ impl Tally {
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let (cell, refined) = (outcome.cell as usize, self.refined);
-        let kind = Kind { refined, stops: self.stops, driven: self.driven };
+        let counted = Counted { refined, stops: self.stops, driven: self.driven };
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
         if self.named.len() < MAX_KNOWN && self.cells[cell].counts.iter().sum::<u64>() < MAX_NAMED {
             self.named.push(MemberTime::new(outcome, refined));
         }
-        self.cells[cell].add(outcome, kind)?;
+        self.cells[cell].add(outcome, counted)?;
         if !outcome.group.is_empty() {
-            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, kind)?;
+            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, counted)?;
         }
         if refined {
             self.nodes.add(outcome);
