@@ -103,6 +103,7 @@ fn finish_attempt() {
     let nodes = windows(advanced(0u, x, load_field(BEFORE)), advanced(1u, y, load_field(BEFORE + 1u)));
     new_x = nodes.a;
     new_y = nodes.b;
+    if FORCED { correct(); }
     displaced(x, y);
     new_k = advanced(2u, load_field(CURVE + 2u), load_field(BEFORE + 2u));
     new_r = advanced(3u, load_field(CURVE + 3u), load_field(BEFORE + 3u));

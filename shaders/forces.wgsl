@@ -16,10 +16,13 @@ struct Law { c1: real, c2: real, c3: real, c4: real, c5: real, c6: real, c7: rea
 /// The coefficients, for the values that follow.
 var<private> law: Law;
 
+/// lambda, which is added to c1 where the length is kept.
+var<private> multiplier: real;
+
 /// Reads the coefficients, once for k and once for the positions, so that no solve holds them in registers.
 fn read_law() {
     let p = &all_parameters[member].law;
-    law = Law(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7]);
+    law = Law(select(p[0], p[0] + multiplier, FORCED), p[1], p[2], p[3], p[4], p[5], p[6], p[7]);
 }
 
 fn b(curvature: vec) -> vec {
@@ -264,6 +267,15 @@ fn of_polygon(wx: Window, wy: Window, given: Directions) -> Force {
     let across = inward / sqrt(along_x * along_x + along_y * along_y);
     let sliding = real(0.5) * alpha;
     return Force(sliding * along_x - across * along_y, sliding * along_y + across * along_x);
+}
+
+/// The energy of the polygon at the nodes between two edges, with `½ 2sin(θ/2) 2tan(θ/2)` over the length there.
+fn energy_at_vertex(e: Edge, f: Edge) -> vec {
+    let turned = vertex_turn(e, f);
+    let square = turned * turned;
+    let length = real(0.5) * (e.length + f.length);
+    let bending = real(0.5) * square / (sqrt(vec(1.0) - real(0.25) * square) * length);
+    return bending + all_parameters[member].law[LENGTH_PENALTY] * length;
 }
 
 /// The energy of a unit of length.

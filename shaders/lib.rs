@@ -26,6 +26,7 @@ files! {
     EXCHANGE_SUBGROUP "exchange_subgroup.wgsl",
     EXTRAPOLATION "extrapolation.wgsl",
     FORCES "forces.wgsl",
+    FORCING "forcing.wgsl",
     GAUSS_SEIDEL "gauss_seidel.wgsl",
     MEMBER "member.wgsl",
     NUMBER "number.wgsl",

@@ -65,6 +65,12 @@ fn corner(wx: Window, wy: Window) -> Corner {
     return Corner(coordinate(minus1(wx)), coordinate(here(wx)), coordinate(minus1(wy)), coordinate(here(wy)));
 }
 
+/// `x_{i-1} × x_i`.
+fn cross(wx: Window, wy: Window) -> vec {
+    let at = corner(wx, wy);
+    return at.before_x * at.y - at.x * at.before_y;
+}
+
 /// `L²/(4π|A|)`, least at equilibrium.
 fn quotient(length: real, area: real) -> real {
     return length * length / (all_parameters[member].law[QUOTIENT] * abs(area));
@@ -143,16 +149,17 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let x = rises_of_places(wx);
     let y = rises_of_places(wy);
     let own = edge(x.here, y.here).length;
-    let at = corner(wx, wy);
-    let cross = at.before_x * at.y - at.x * at.before_y;
     var energy = vec(0.0);
     if CRYSTAL {
         energy = tension(tangent_of(edge(x.here, y.here))).energy * own;
     } else {
         energy = energy_density(kh) * rh;
+        if FORCED && all_parameters[member].law[CONSERVED] > real(0.0) {
+            energy = energy_at_vertex(edge(x.here, y.here), edge(x.plus1, y.plus1));
+        }
     }
     let turning = winding(x.here, y.here, x.plus1, y.plus1);
-    let part = vec(block_sum(own), block_sum(cross), block_sum(energy), block_sum(turning));
+    let part = vec(block_sum(own), block_sum(cross(wx, wy)), block_sum(energy), block_sum(turning));
     let shortest = -bounded_abs(own);
     let extremes_of_block = vec(
         block_max(bounded_abs(kh * rh)),

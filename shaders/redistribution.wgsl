@@ -21,7 +21,8 @@ fn redistribute(moves: bool) -> real {
     let old = windows(k, r);
     k_window = old.a;
     reciprocals(old.b);
-    let beta = velocity(k, k_window);
+    var beta = velocity(k, k_window);
+    if FORCED { beta = act(k, r, beta); }
     trace(0u, beta);
     rkb = r * k * beta;
     let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0));

@@ -41,6 +41,8 @@ fn forget() {
     extremes = vec();
     others = vec();
     displacement = vec();
+    multiplier = 0.0;
+    force = 0.0;
 }
 
 /// Computes the curve a time tau later, redistributed if `moves`. An odd phase means that the curvature is solved.
@@ -81,6 +83,10 @@ fn step(begun: Course, moves: bool) -> Course {
     let nodes = windows(advanced(0u, x, u), advanced(1u, y, v));
     new_x = nodes.a;
     new_y = nodes.b;
+    if FORCED {
+        push(x, y);
+        correct();
+    }
     displaced(x, y);
     new_r = here(r_new);
     if all_parameters[member].pull > real(0.0) { pull(); }

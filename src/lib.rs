@@ -65,7 +65,7 @@ pub use curvelax_base::{Error, Result, error, random};
 pub use curvelax_curve as curve;
 pub use curvelax_ensemble as ensemble;
 pub use curvelax_ensemble::simulate;
-pub use curvelax_flow::{crystal, equilibrium, flow, number, scheme, solver};
+pub use curvelax_flow::{crystal, equilibrium, flow, forcing, number, scheme, solver};
 pub use curvelax_statistics as statistics;
 pub use curvelax_study::{conformance, placement, relax, results, truth};
 

@@ -16,10 +16,11 @@ use curvelax::{
     conformance::{
         ConformanceRow, Driven, Tamper, adaptive_members,
         compare::{Left, MAX_SWEEPS, MEMBERS, adaptive, events, on_gpu, on_gpu_by, runs, stages},
-        crystals, members, self_test, stages_of,
+        driven, members, self_test, stages_of,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
     flow::{DIFFUSIVITY_WAVES, ENERGY_WAVES},
+    forcing::{CONSERVED, DRIVE, FEEDBACK, FEEDBACK_AREA, KEPT_AREA, KEPT_LENGTH},
     placement::MAX_POINTS_F32,
     scheme::{
         State,
@@ -119,6 +120,13 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         for n in sizes(&ADAPTIVE_SIZES, &[101]) {
             add(format!("crystals agree, n = {n}"), crystals_agree::<T>, n);
         }
+        for n in sizes(&ADAPTIVE_SIZES, &[101]) {
+            add(format!("driven and constrained curves agree, n = {n}"), forced_agree::<T>, n);
+        }
+        for n in sizes(&ADAPTIVE_SIZES, &[101]) {
+            add(format!("driven crystals agree, n = {n}"), forced_crystals_agree::<T>, n);
+        }
+        add("another force or conserved quantity fails the comparison".into(), another_force_fails::<T>, 101);
         add("another energy or mobility fails the comparison".into(), another_crystal_fails::<T>, 101);
         for n in sizes(&ADAPTIVE_SIZES, &[101]) {
             add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
@@ -196,23 +204,57 @@ fn geometric_agrees<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome 
     Ok(())
 }
 
-/// Stage by stage and after fixed and adaptive steps, by the same bounds. In f32 only after few adaptive ones: x counts in
-/// their errors, which are then next to rounding, and of forty steps one side makes another number.
-fn crystals_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    check(&stages_of::<T>(Driven::Crystals, gpu, solver, n, None)?)?;
+/// Stage by stage and after fixed and adaptive steps, by the same bounds; the kernel is another one than that of `other`. In
+/// f32 only after few adaptive steps: x counts in their errors, which are then next to rounding, and of forty steps one side
+/// makes another number.
+fn driven_agree<T: Evolves>([as_driven, other]: [Driven; 2], gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    check(&stages_of::<T>(as_driven, gpu, solver, n, None)?)?;
     let many = (T::PRECISION == Precision::F64).then_some(None);
     for steps in [Some(1), Some(100)].into_iter().chain(many) {
-        check(&crystals::<T>(gpu, solver, n, steps, dispatches_of(7), None)?)?;
+        check(&driven::<T>(as_driven, gpu, solver, n, steps, dispatches_of(7), None)?)?;
     }
     let (blocks, method) = (Blocks::new(n).ok_or("n")?, Method::coloured(solver, MAX_SWEEPS));
     for adaptive in [false, true] {
-        let variant = Driven::Crystals.variant(Variant { adaptive, ..gpu.capacity().variant(blocks, solver) });
+        let variant = as_driven.variant(Variant { adaptive, ..gpu.capacity().variant(blocks, solver) });
         let mut kernel = Kernel::<T>::new(gpu, blocks, MEMBERS, MAX_SWEEPS, variant)?;
         let mut test =
             |driven| self_test::<T>(&mut kernel, gpu.name(), gpu.is_hardware(), &method, n, adaptive, driven);
-        test(Driven::Crystals)?;
-        if test(Driven::Geometric).is_ok() {
-            return Err("the kernel of crystals passes for another one".into());
+        test(as_driven)?;
+        if test(other).is_ok() {
+            return Err(format!("the kernel for {as_driven:?} passes for {other:?}").into());
+        }
+    }
+    Ok(())
+}
+
+fn crystals_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    driven_agree::<T>([Driven::Crystals, Driven::Geometric], gpu, solver, n)
+}
+
+fn forced_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    driven_agree::<T>([Driven::Forced, Driven::Paper], gpu, solver, n)
+}
+
+fn forced_crystals_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    driven_agree::<T>([Driven::ForcedCrystals, Driven::Paper], gpu, solver, n)
+}
+
+/// Each number of a force and of what is kept is in the comparison: with another one on the GPU, it fails.
+fn another_force_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let changes: [(&str, fn(&mut Run<f64>)); 6] = [
+        ("force", |run| run.parameters.law[DRIVE] *= 1.1),
+        ("gain", |run| run.parameters.law[FEEDBACK] *= 1.1),
+        ("area of feedback", |run| run.parameters.law[FEEDBACK_AREA] *= 1.1),
+        ("area kept", |run| run.parameters.law[KEPT_AREA] *= 1.001),
+        ("length kept", |run| run.parameters.law[KEPT_LENGTH] *= 1.001),
+        ("set of what is kept", |run| run.parameters.law[CONSERVED] = 3.0 - run.parameters.law[CONSERVED]),
+    ];
+    for (what, change) in changes {
+        match driven::<T>(Driven::Forced, gpu, solver, n, Some(1), dispatches_of(7), Some(change)) {
+            Ok(rows) if rows.iter().all(ConformanceRow::passes) => {
+                return Err(format!("another {what} was not noticed").into());
+            }
+            _ => {}
         }
     }
     Ok(())
@@ -223,7 +265,7 @@ fn another_crystal_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Out
     let energy: fn(&mut Run<f64>) = |run| run.parameters.law[ENERGY_WAVES + 1] *= 1.001;
     let mobility: fn(&mut Run<f64>) = |run| run.parameters.law[DIFFUSIVITY_WAVES + 2] *= 1.001;
     for (what, change) in [("energy", energy), ("mobility", mobility)] {
-        match crystals::<T>(gpu, solver, n, Some(1), dispatches_of(7), Some(change)) {
+        match driven::<T>(Driven::Crystals, gpu, solver, n, Some(1), dispatches_of(7), Some(change)) {
             Ok(rows) if rows.iter().all(ConformanceRow::passes) => {
                 return Err(format!("another {what} was not noticed").into());
             }

@@ -23,6 +23,8 @@ pub struct Variant {
     pub geometric: bool,
     /// Does so with an energy and a mobility that depend on the direction.
     pub crystal: bool,
+    /// A force drives the curve, or its area or length are kept.
+    pub forced: bool,
     /// Records what every stage of a step computes.
     pub traced: bool,
     /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
@@ -38,14 +40,18 @@ impl Variant {
         let exchanging = |solver| exchanges(solver).map(move |subgroup| Variant { subgroup, ..Variant::of(solver) });
         let made_for = |own| [own, Variant { traced: true, ..own }, Variant { adaptive: true, ..own }];
         let geometric = |own| Variant { geometric: true, ..own };
-        let forms = |own| [own, geometric(own), Variant { crystal: true, ..geometric(own) }];
+        let forms = |own| {
+            let geometric = geometric(own);
+            let forced = Variant { forced: true, ..geometric };
+            [own, geometric, forced, Variant { crystal: true, ..geometric }, Variant { crystal: true, ..forced }]
+        };
         Solver::ALL.into_iter().flat_map(exchanging).flat_map(made_for).flat_map(forms).collect()
     }
 
     /// Returns the variant for fixed steps.
     pub const fn of(solver: Solver) -> Variant {
-        let (adaptive, watched, geometric, crystal) = (false, false, false, false);
-        Variant { solver, adaptive, watched, geometric, crystal, traced: false, subgroup: false }
+        let (adaptive, watched, geometric, crystal, forced) = (false, false, false, false, false);
+        Variant { solver, adaptive, watched, geometric, crystal, forced, traced: false, subgroup: false }
     }
 
     /// Returns the files of the kernel, in the order of the step.
@@ -57,7 +63,7 @@ impl Variant {
     }
 }
 
-const COMMON: [ShaderPart; 20] = [
+const COMMON: [ShaderPart; 21] = [
     shaders::NUMBER,
     shaders::PLACE,
     shaders::RING,
@@ -65,6 +71,7 @@ const COMMON: [ShaderPart; 20] = [
     shaders::MEMBER,
     shaders::STATE,
     shaders::FORCES,
+    shaders::FORCING,
     shaders::REDISTRIBUTION,
     shaders::SYSTEM,
     shaders::CURVATURE,
@@ -94,11 +101,12 @@ fn of_solver(solver: Solver) -> &'static [ShaderPart] {
 
 /// Returns the whole source in precision `T`.
 pub fn source<T: Real>(variant: Variant) -> String {
-    let Variant { solver, adaptive, watched, geometric, crystal, .. } = variant;
-    let (number, epsilon, sweeps) = (T::NAME, T::EPSILON, solver.sweeps());
+    let Variant { solver, adaptive, watched, geometric, crystal, forced, .. } = variant;
+    let (number, epsilon, root, sweeps) = (T::NAME, T::EPSILON, T::EPSILON.sqrt(), solver.sweeps());
     let mut text = format!(
-        "alias real = {number}; const EPSILON = {epsilon:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
-         const WATCHED = {watched}; const GEOMETRIC = {geometric}; const CRYSTAL = {crystal};\n"
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ROOT_EPSILON = {root:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
+         const WATCHED = {watched}; const GEOMETRIC = {geometric}; const CRYSTAL = {crystal}; \
+         const FORCED = {forced};\n"
     );
     for (_, part) in variant.parts() {
         text.push_str(part);

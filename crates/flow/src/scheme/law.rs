@@ -66,7 +66,7 @@ impl<N: Number> Parameters<N> {
         let mut coefficients = [N::of(0.0); MAX_DEGREE];
         coefficients.copy_from_slice(&self.law[..MAX_DEGREE]);
         let (energy, diffusivity) = (self.waves(ENERGY_WAVES), self.waves(DIFFUSIVITY_WAVES));
-        Law { coefficients, energy, diffusivity, unit: self.law[ENERGY_UNIT], force: N::of(0.0), kind }
+        Law { coefficients, energy, diffusivity, unit: self.law[ENERGY_UNIT], kind }
     }
 
     /// The waves from this place on: the factors of the real and of the imaginary part of the power.
@@ -89,8 +89,6 @@ pub struct Law<N> {
     diffusivity: [[N; 2]; MOST_WAVES],
     /// Factor of `∮γ ds` in the energy that is reported.
     pub(super) unit: N,
-    /// The force along the inward normal, of this step.
-    pub(super) force: N,
     pub(super) kind: Kind,
 }
 

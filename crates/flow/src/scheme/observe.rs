@@ -43,7 +43,7 @@ pub struct CurveSums<N> {
     pub length: N,
     /// `½ Σ x_{i-1} × x_i`.
     pub area: N,
-    /// `Σ (½k_i² + λ) r_i`; of a crystal `Σ γ |e_i|`, in the same unit.
+    /// `Σ (½k_i² + λ) r_i`; of a crystal `Σ γ |e_i|`, in the same unit; where the area or the length is kept, that of the polygon.
     pub energy: N,
     /// Windings of the edge vector round the origin.
     pub turning: N,
@@ -170,7 +170,10 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
         let k = curve.k[i];
-        let energy = p.energy_density(k) * curve.r[i];
+        let energy = match kind.conserved {
+            0 => p.energy_density(k) * curve.r[i],
+            _ => p.energy_at_vertex(edge(curve, i), edge(curve, (i + 1) % curve.len())),
+        };
         sums.add(i, [edge(curve, i)[2], cross(curve, i), energy, winding(curve, i)]);
     }
     let [length, area, energy, turning] = sums.totals();

@@ -49,17 +49,10 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let c = q * self.rate - (a + b + d + e);
         let rhs = match self.geometric {
             true => forces::of_polygon(self.old, self.motion, i),
-            false => {
-                let residual = [
-                    residual_of_old(off, self.old.x.offsets_of_places(i)),
-                    residual_of_old(off, self.old.y.offsets_of_places(i)),
-                ];
-                if self.motion.law.kind.is_forced() {
-                    forces::pushed(residual, self.old, self.motion, q, i)
-                } else {
-                    residual
-                }
-            }
+            false => [
+                residual_of_old(off, self.old.x.offsets_of_places(i)),
+                residual_of_old(off, self.old.y.offsets_of_places(i)),
+            ],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }

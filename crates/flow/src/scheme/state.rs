@@ -287,6 +287,8 @@ impl<T: Real> State<T> {
 pub struct Motion<N> {
     /// The law of this step.
     pub law: Law<N>,
+    /// The force along the inward normal, beside the law.
+    pub force: N,
     /// `b(k)`.
     pub b: Ring<N>,
     /// Normal velocity β.
@@ -358,6 +360,7 @@ impl<N: Number> Workspace<N> {
             blocks,
             motion: Motion {
                 law: Law::default(),
+                force: N::default(),
                 b: ring(),
                 beta: nodes(),
                 rkb: nodes(),

@@ -134,7 +134,10 @@ pub fn step_by<N: Number, S: Solves>(
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
     state::advance(0, &old.x, &increments.x, &mut new.x);
     state::advance(1, &old.y, &increments.y, &mut new.y);
-    forcing::correct(new, p, branches.law, *blocks, gradients);
+    if branches.law.is_forced() {
+        forcing::push(old, new, motion, p.tau);
+        forcing::correct(new, p, branches.law, *blocks, gradients);
+    }
     pull::pull(new, p, branches);
 
     // The second solve counts only if the first one succeeded.

@@ -7,6 +7,7 @@ use curvelax_ensemble::{Family, Spec, schedule::Ticks};
 use curvelax_flow::{
     crystal::Crystal,
     flow::Flow,
+    forcing::{Conserved, Drive, Forcing},
     number::Precision,
     scheme::{
         Parameters, State,
@@ -41,6 +42,10 @@ pub enum Driven {
     Geometric,
     /// That force, with an energy and a mobility that depend on the direction.
     Crystals,
+    /// The force of the polygon and one beside the flow; or the area or the length is kept.
+    Forced,
+    /// A crystal and a driving force.
+    ForcedCrystals,
 }
 
 impl Driven {
@@ -55,7 +60,15 @@ impl Driven {
 
     /// The variant of a kernel for it.
     pub fn variant(self, of_paper: Variant) -> Variant {
-        Variant { geometric: self != Driven::Paper, crystal: self == Driven::Crystals, ..of_paper }
+        Variant { geometric: self != Driven::Paper, crystal: self.is_crystal(), forced: self.is_forced(), ..of_paper }
+    }
+
+    fn is_crystal(self) -> bool {
+        matches!(self, Driven::Crystals | Driven::ForcedCrystals)
+    }
+
+    fn is_forced(self) -> bool {
+        matches!(self, Driven::Forced | Driven::ForcedCrystals)
     }
 
     /// Changes members of the comparison, which are the paper's.
@@ -65,8 +78,11 @@ impl Driven {
         }
         for (j, run) in runs.iter_mut().enumerate() {
             run.parameters.geometric = 1.0;
-            if self == Driven::Crystals {
+            if self.is_crystal() {
                 become_crystal(run, CRYSTALS[j % CRYSTALS.len()]);
+            }
+            if self.is_forced() {
+                become_forced(run, if self.is_crystal() { j % 2 } else { j % FORCINGS });
             }
         }
     }
@@ -95,6 +111,26 @@ fn become_crystal(run: &mut Run<f64>, [energy, diffusivity]: [&str; 2]) {
     if p.adaptive > 0.0 {
         p.follow_to = 1e-3 * now.excess;
     }
+}
+
+/// Forces and conserved quantities of the members, each with every law: a constant force, a feedback, the area, the length
+/// and both.
+const FORCINGS: usize = 5;
+
+/// Lets one of them act on a member, which is at its start. What is kept is a little off at the start.
+fn become_forced(run: &mut Run<f64>, which: usize) {
+    let now = &run.report.now;
+    let kept = [1.0003 * now.area, 0.9999 * now.length];
+    let forcing = match which {
+        0 => Forcing { drive: Some(Drive::Constant(0.2)), ..Forcing::default() },
+        1 => Forcing { drive: Some(Drive::Feedback { gain: -0.1, area: 5.0 }), ..Forcing::default() },
+        2 => Forcing { conserved: Some(Conserved::Area), kept, ..Forcing::default() },
+        3 => Forcing { conserved: Some(Conserved::Length), kept, ..Forcing::default() },
+        _ => Forcing { conserved: Some(Conserved::AreaAndLength), kept, ..Forcing::default() },
+    };
+    forcing.write(&mut run.parameters.law, 1.0);
+    let now = Run::new(run.state.clone(), run.parameters).report.now;
+    (run.report.before, run.report.now) = (now, now);
 }
 
 /// Creates `count` different members of `n` nodes, each with its own curve, flow, τ, ω and κ, to run `steps` steps.

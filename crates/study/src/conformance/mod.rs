@@ -16,5 +16,5 @@ pub mod self_test;
 pub use curvelax_backend::bounds;
 
 pub use cases::{Driven, adaptive_members, members};
-pub use compare::{ConformanceRow, Tamper, adaptive, crystals, events, runs, stages, stages_of};
+pub use compare::{ConformanceRow, Tamper, adaptive, driven, events, runs, stages, stages_of};
 pub use self_test::self_test;

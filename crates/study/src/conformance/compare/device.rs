@@ -38,7 +38,9 @@ pub fn on_gpu<T: Evolves>(
     let watched = launches.iter().any(|launch| launch.parameters.branches().watched);
     let geometric = launches.iter().any(|launch| launch.parameters.branches().geometric);
     let crystal = launches.iter().any(|launch| launch.parameters.branches().law.is_crystal());
-    let variant = Variant { adaptive, watched, geometric, crystal, ..adapter.capacity().variant(blocks(n)?, solver) };
+    let forced = launches.iter().any(|launch| launch.parameters.branches().law.is_forced());
+    let variant =
+        Variant { adaptive, watched, geometric, crystal, forced, ..adapter.capacity().variant(blocks(n)?, solver) };
     on_gpu_by::<T>(adapter, variant, n, launches, budget)
 }
 

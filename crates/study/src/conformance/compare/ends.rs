@@ -61,9 +61,10 @@ pub fn adaptive<T: Evolves>(
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
-/// Compares crystals after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`. Those on the
+/// Compares members driven so after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`. Those on the
 /// GPU are changed, if a change is given; the comparison must then fail.
-pub fn crystals<T: Evolves>(
+pub fn driven<T: Evolves>(
+    driven: Driven,
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
@@ -75,7 +76,7 @@ pub fn crystals<T: Evolves>(
         Some(steps) => members(n, MEMBERS, steps, T::PRECISION.tolerance())?,
         None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
     };
-    Driven::Crystals.change(&mut launches);
+    driven.change(&mut launches);
     let mut changed = launches.clone();
     if let Some(change) = change {
         changed.iter_mut().for_each(change);

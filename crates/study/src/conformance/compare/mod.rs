@@ -12,7 +12,7 @@ mod twin;
 pub use super::cases::MEMBERS;
 pub use device::{Left, on_gpu, on_gpu_by};
 pub(super) use ends::compare_ends;
-pub use ends::{ADAPTIVE_STEPS, adaptive, crystals, runs};
+pub use ends::{ADAPTIVE_STEPS, adaptive, driven, runs};
 pub use levels::events;
 pub use row::ConformanceRow;
 pub use setup::{MAX_SWEEPS, Tamper};

@@ -1,0 +1,99 @@
+// Driving forces, and the area and length that are kept. Twin of crates/flow/src/scheme/forcing.rs.
+
+/// The places of F, of C and A0 of a feedback, of what is kept and of the area and length at which it is kept.
+const DRIVE = 23u;
+const FEEDBACK = 24u;
+const FEEDBACK_AREA = 25u;
+const CONSERVED = 26u;
+const KEPT_AREA = 27u;
+const KEPT_LENGTH = 28u;
+/// Rounds of a correction.
+const ROUNDS = 4u;
+
+/// F + p of this step.
+var<private> force: real;
+
+/// beta with F + lambda k + p, for the old curvatures and lengths; lambda joins the law.
+fn act(k: vec, r: vec, beta: vec) -> vec {
+    settle();
+    let old = windows(load_field(curve), load_field(curve + 1u));
+    let area = sizes(old.a, old.b).x;
+    workgroupBarrier();
+    let first = ring_sums(vec(block_sum(r), block_sum(r * k), block_sum(r * k * k), block_sum(r * beta)));
+    workgroupBarrier();
+    let flow_turned = ring_sums(vec(block_sum(r * k * beta), 0.0, 0.0, 0.0)).x;
+    // Others may still read it.
+    workgroupBarrier();
+    let p = &all_parameters[member].law;
+    let drive = p[DRIVE] + p[FEEDBACK] * (area - p[FEEDBACK_AREA]);
+    let moved = first.w + drive * first.x;
+    let turned = flow_turned + drive * first.y;
+    let by = balanced(first, -moved, -turned);
+    force = drive + by.x;
+    multiplier = by.y;
+    law.c1 += multiplier;
+    return beta + (vec(force) + multiplier * k);
+}
+
+/// Moves the nodes of the new curve by a time tau of the force, along the inward normals of the old one.
+fn push(x: vec, y: vec) {
+    settle();
+    let old = windows(x, y);
+    let ex = rises_of_places(old.a);
+    let ey = rises_of_places(old.b);
+    let along_x = ex.here + ex.plus1;
+    let along_y = ey.here + ey.plus1;
+    let across = (tau * force) / sqrt(along_x * along_x + along_y * along_y);
+    settle();
+    let nodes = windows(moved(here(new_x), -(across * along_y)), moved(here(new_y), across * along_x));
+    new_x = nodes.a;
+    new_y = nodes.b;
+}
+
+/// Moves the nodes of the new curve along the gradients of its area and its length to those that are kept.
+fn correct() {
+    let x = rises_of_places(new_x);
+    let y = rises_of_places(new_y);
+    let e = edge(x.here, y.here);
+    let f = edge(x.plus1, y.plus1);
+    let ax = real(0.5) * (e.y + f.y);
+    let ay = -(real(0.5) * (e.x + f.x));
+    let by_e = vec(1.0) / e.length;
+    let by_f = vec(1.0) / f.length;
+    let lx = e.x * by_e - f.x * by_f;
+    let ly = e.y * by_e - f.y * by_f;
+    let part = vec(block_sum(ax * ax + ay * ay), block_sum(ax * lx + ay * ly), block_sum(lx * lx + ly * ly), 0.0);
+    let squares = ring_sums(part);
+    let p = &all_parameters[member].law;
+    for (var round = 0u; round < ROUNDS; round++) {
+        // Others may still read the last sums.
+        workgroupBarrier();
+        let now = sizes(new_x, new_y);
+        let by = balanced(squares, p[KEPT_AREA] - now.x, p[KEPT_LENGTH] - now.y);
+        let nodes = windows(
+            moved(here(new_x), by.x * ax + by.y * lx), moved(here(new_y), by.x * ay + by.y * ly),
+        );
+        new_x = nodes.a;
+        new_y = nodes.b;
+    }
+}
+
+/// Solves `(x y; y z) u = (s; t)`, with x, y, z of `m`, for what is kept, the area and the length: the other unknown is 0. On
+/// a circle both equations are one, and the length gives way.
+fn balanced(m: vec, s: real, t: real) -> vec2<real> {
+    let kept = u32(all_parameters[member].law[CONSERVED]);
+    let area_kept = real(kept & 1u);
+    let length_kept = real(kept >> 1u);
+    let share = area_kept * (m.y / m.x);
+    let own = m.z - share * m.y;
+    let least = real(ROOT_EPSILON) * m.z;
+    let v = length_kept * ((t - share * s) * own / (own * own + least * least));
+    return vec2(area_kept * ((s - m.y * v) / m.x), v);
+}
+
+/// The area and the length of a polygon.
+fn sizes(wx: Window, wy: Window) -> vec2<real> {
+    let length = edge(rises_of_places(wx).here, rises_of_places(wy).here).length;
+    let all = ring_sums(vec(block_sum(cross(wx, wy)), block_sum(length), 0.0, 0.0));
+    return vec2(real(0.5) * all.x, all.y);
+}
