@@ -17,13 +17,13 @@ fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
         ("--shape circle:1 --drive 0.5 --precision f32 --points 64", 1.0, 0.5),
         // The force is a velocity, whatever the mobility, and units of length change no digit.
         ("--shape circle:1 --drive 0.5 --mobility 10", 1.0, 0.5),
-        ("--shape circle:3e-6 --drive 2e-7 --mobility 1e-20", 3e-6, 2e-7),
+        ("--shape circle:3e-6 --drive 2e-4 --mobility 1e-20", 3e-6, 2e-4),
         ("--shape circle:1 --drive 2 --energy cos:4,0", 1.0, 2.0),
     ] {
         let row = one(&format!("{flags} --t-end auto"));
         let (t, end) = (number(&row, "t_vanish"), number(&row, "t_end"));
         assert_eq!(row["status"], "vanished", "{flags}");
-        assert!((t * force / radius - 1.0).abs() < 1e-3, "{flags}: {t}");
+        assert!((t * force / radius - 1.0).abs() < 2e-4, "{flags}: {t}");
         // It was followed to a quarter of its length, and not much beyond.
         let left = number(&row, "length_end") / number(&row, "length_start");
         assert!(end < t && (0.1..=0.25).contains(&left), "{flags}: {end} {left}");
@@ -31,7 +31,7 @@ fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
 }
 
 #[test]
-fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_one_without_a_force_singular_as_ever() {
+fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_none_vanishes_without_a_force() {
     let row = one("--shape circle:1 --drive 0.5 --t-end 1.7 --relax-at 1e-12");
     assert_eq!((&*row["status"], &*row["t_vanish"], number(&row, "t_end")), ("relaxed", "", 1.7));
     let row = one("--shape flower:3:0.1 --drive 0.5 --t-end 0.01");
@@ -39,8 +39,13 @@ fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_one_without_a_force_s
     let row = one("--shape circle:1 --drive -0.5 --t-end 0.5");
     let grown = number(&row, "length_end") / number(&row, "length_start");
     assert!((grown - 1.25).abs() < 1e-3 && row["t_vanish"].is_empty(), "{grown}");
-    // Curvature flow shrinks a circle, too.
-    assert_eq!(one("--shape circle:1 --flow poly:1 --t-end 0.6")["status"], "singular");
+    // Curvature flow shrinks curves, too, but no force drives them.
+    let row = one("--shape ellipse:2,1 --flow poly:1 --t-end 2 --relax-to 1e-9");
+    assert!(
+        row["status"] != "vanished" && row["t_vanish"].is_empty() && number(&row, "t_end") < 2.0,
+        "{}",
+        row["status"]
+    );
 }
 
 #[test]
@@ -51,8 +56,8 @@ fn a_feedback_brings_the_area_to_its_own() {
     let rest = 0.9;
     let share = (1.0 - rest) / (1.0 + rest) * f64::exp(-2.0 * PI * gain * rest);
     let radius = rest * (1.0 + share) / (1.0 - share);
-    let found = number(&row, "area_end") / number(&row, "area_start");
-    assert!((found - radius * radius).abs() < 2e-4, "{found} {}", radius * radius);
+    let (found, exact) = (number(&row, "area_end"), PI * radius * radius);
+    assert!((found / exact - 1.0).abs() < 2e-4, "{found} {exact}");
     assert!(row["t_vanish"].is_empty());
 }
 

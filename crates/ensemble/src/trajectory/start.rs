@@ -94,7 +94,7 @@ impl<'a> Trajectory<'a> {
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
-            vanishing: Vanishing::new(flow, forcing, &start, unit, precision),
+            vanishing: Vanishing::new(flow, forcing, (&start, nodes.len()), unit, precision),
             t_vanish: None,
             settling: Settling::of(spec, &start),
             conserved: forcing.conserved.is_some(),

@@ -7,6 +7,8 @@
 //! An adaptive step must not pass the end of that life: nodes would cross the centre, and the curve would grow again, upside
 //! down. Steps therefore end where half of what is left has passed, and again at half of the rest.
 
+use std::f64::consts::PI;
+
 use crate::{Observables, theory::vanishing::vanishes_after};
 use curvelax_flow::{
     flow::Flow,
@@ -25,6 +27,8 @@ const PART: f64 = 0.5;
 pub(super) struct Vanishing {
     flow: Flow,
     forcing: Forcing,
+    /// The radius of n nodes on a circle over 2A/L.
+    outer: f64,
     /// The length at which it is decided, in the member's unit, a number of the run's precision.
     level: f64,
     /// When half of what was left will have passed, in the member's unit; infinite if it does not vanish.
@@ -32,18 +36,19 @@ pub(super) struct Vanishing {
 }
 
 impl Vanishing {
-    /// That of a driven simple curve with the observables `start`, in lengths of `unit`.
+    /// That of a driven simple curve with the observables `start` of so many nodes, in lengths of `unit`.
     pub(super) fn new(
         flow: Flow,
         forcing: Forcing,
-        start: &Observables,
+        (start, points): (&Observables, usize),
         unit: f64,
         precision: Precision,
     ) -> Option<Vanishing> {
         let may = forcing.drive.is_some() && start.turning.abs() == 1;
         may.then(|| {
             let level = precision.rounded(LEFT * start.length / unit);
-            let mut own = Vanishing { flow, forcing, level, until: 0.0 };
+            let outer = (PI / points as f64).cos().recip();
+            let mut own = Vanishing { flow, forcing, outer, level, until: 0.0 };
             own.look_ahead(0.0, start, unit);
             own
         })
@@ -66,9 +71,9 @@ impl Vanishing {
     }
 
     /// The time that is left to a curve, for unit mobility. Its area falls at the rate F times its length, so 2A/L is the radius
-    /// that lasts as long.
+    /// that lasts as long; on a circle its nodes are a little outside.
     pub(super) fn left(&self, at: &Observables) -> Option<f64> {
-        vanishes_after(&self.flow, &self.forcing, 2.0 * at.area.abs() / at.length)
+        vanishes_after(&self.flow, &self.forcing, self.outer * (2.0 * at.area.abs() / at.length))
     }
 }
 
@@ -81,14 +86,14 @@ mod tests {
         let start = Observables { length: 8.0, area: 4.0, turning: 1, ..Observables::default() };
         let of = |drive: Option<&str>, start: &Observables| {
             let forcing = Forcing { drive: drive.map(|drive| drive.parse().unwrap()), ..Forcing::default() };
-            Vanishing::new(Flow::SurfaceDiffusion, forcing, start, 2.0, Precision::F32)
+            Vanishing::new(Flow::SurfaceDiffusion, forcing, (start, 4), 2.0, Precision::F32)
         };
         let own = of(Some("0.5"), &start).unwrap();
         let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
         own.aim(&mut parameters);
         assert_eq!((parameters.watched, parameters.low_length), (1.0, 1.0));
-        // 2A/L = 1 lasts to t = 2, in units of the fourth power of 2.
-        assert!((own.until - 1.0 / 16.0).abs() < 1e-12);
+        // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of 2.
+        assert!((own.until - 2_f64.sqrt() / 16.0).abs() < 1e-12);
         // An event at a longer length comes first.
         parameters.low_length = 3.0;
         own.aim(&mut parameters);
@@ -96,7 +101,7 @@ mod tests {
         let at = |length| Observed { length, ..Observed::default() };
         assert!(own.is_due(&at(0.9)) && !own.is_due(&at(1.1)));
         let radius = 0.7_f64;
-        let (length, area) = (std::f64::consts::TAU * radius, std::f64::consts::PI * radius * radius);
+        let (length, area) = (4.0 * 2_f64.sqrt() * radius, 2.0 * radius * radius);
         let left = own.left(&Observables { length, area, ..start }).unwrap();
         assert!((left - 1.4).abs() < 1e-12, "{left}");
         assert!(of(None, &start).is_none() && of(Some("0.5"), &Observables { turning: 0, ..start }).is_none());
