@@ -54,14 +54,18 @@ class Keys(TypedDict, total=False):
     decay: float | str | Any
     """Power p: mode m has standard deviation σ m^-p; or a distribution. By default 1."""
 
+    reduced_area: float | str | Any
+    """Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi
+    A/L^2, 0.05 to 1; or a distribution. Needs conserve area,length. By default as it is."""
+
     perturbation: Literal["amplitude-phase", "gaussian"]
     """Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos
     and sin with the same power. By default amplitude-phase."""
 
     design: Literal["random", "sobol", "lhs"]
-    """How the members of a cell are spread over the distributions of shape, flow, energy, diffusivity, amplitude and
-    decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay
-    random. By default random."""
+    """How the members of a cell are spread over the distributions of shape, flow, energy, diffusivity, drive,
+    amplitude, decay and reduced-area: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The
+    modes of the perturbation stay random. By default random."""
 
     only: Sequence[int]
     """Run only these members; each is bit-identical to its run in the whole ensemble. By default all."""
@@ -90,6 +94,18 @@ class Keys(TypedDict, total=False):
     """Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
     DEG), above 0 in all directions; a sum of two as for energy. By default 1."""
 
+    drive: float | str | Any
+    """Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
+    diffusion has R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any number may
+    be a distribution. By default 0."""
+
+    conserve: str
+    """Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
+    vesicle: it is relaxed when relax-to of the way of its energy is left. By default neither."""
+
+    conserve_at: Sequence[float]
+    """The area and the length that are kept; one number if one is. By default those of the polygon at the start."""
+
     mobility: float
     """Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
     results, are then in its unit of time. By default 1."""
@@ -106,7 +122,8 @@ class Keys(TypedDict, total=False):
 
     t_end: float | Literal["auto"] | Sequence[float]
     """Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
-    predicts for its cell. T1,T2,...: one for each cell of a sweep. By default 2."""
+    predicts for its cell; if drive makes it vanish, when it has. T1,T2,...: one for each cell of a sweep. By default
+    2."""
 
     omega: float | Literal["auto"]
     """Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member. By default 1
@@ -123,7 +140,8 @@ class Keys(TypedDict, total=False):
     Use it for rough outlines. By default off."""
 
     stop_when_relaxed: bool
-    """End a member as soon as it is relaxed. By default false, true with t-end auto."""
+    """End a member as soon as it is relaxed. By default false; with t-end auto true, unless it is driven to
+    vanish."""
 
     accurate: bool
     """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine.

@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn every_flag_replaces_its_key() {
         let spec = parse(
-            "--curves 3 --outlines 4 --group-by kind --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --energy cos:4,0.03 --diffusivity cos:4,0.5 --mobility 2 --units um,h \
+            "--curves 3 --outlines 4 --group-by kind --points 7 --seed 9 --sampling points --amplitude 0.5 --modes 1..=2 --decay 2 --perturbation gaussian --design lhs --flow willmore --energy cos:4,0.03 --diffusivity cos:4,0.5 --drive 0.5 --conserve area,length --conserve-at 4,9 --reduced-area 0.7 --mobility 2 --units um,h \
              --tau 1e-6 --t-end 1 --interpolate spline --rounding 0.01 --omega 0 --no-redistribution --pull 3 --form auto --solver direct --order lexicographic \
              --tolerance 1e-4 \
              --sor 1.5 --max-sweeps 10 --backend cpu --adapter a --precision f32 --relax-to 0.1 --stop-when-relaxed \

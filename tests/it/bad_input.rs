@@ -89,6 +89,12 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--energy", "sin:4,0.1", "`sin:4,0.1` is not cos:M,SIZE"),
         ("--energy", "cos:4,0.07", "ill-posed"),
         ("--diffusivity", "cos:4,1", "atoms would run uphill"),
+        ("--conserve", "energy", "area, length, or area,length"),
+        ("--conserve-at", "wide", "not a number"),
+        ("--reduced-area", "low", "not a number"),
+        ("--drive", "up", "`up` is not a finite number"),
+        ("--drive", "1,2", "drive takes one force, or feedback:C,A0"),
+        ("--drive", "feedback:1,-2", "feedback to an area of -2, which must be above 0"),
         ("--sampling", "arc", "arclength"),
         ("--solver", "gaus-seidel", "similar value exists: 'gauss-seidel'"),
         ("--order", "colored", "similar value exists: 'coloured'"),
@@ -251,7 +257,7 @@ fn a_wrong_cell_of_a_table_of_outlines_is_named_by_row_and_column() {
 fn an_overlong_value_is_echoed_by_its_beginning() {
     let long = "a".repeat(10_000);
     let of = |template: &str| template.replace("LONG", &long);
-    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow energy diffusivity mobility form \
+    let flags = "curves points seed shape outlines sampling amplitude modes decay perturbation design sweep flow energy diffusivity drive conserve conserve-at reduced-area mobility form \
                  units tau adaptive t-end omega pull solver order tolerance sor max-sweeps backend precision relax-to \
                  relax-at only shard accuracy event series snapshots store tables";
     let mut all: Vec<Vec<String>> =

@@ -191,13 +191,13 @@ fn python_type(value: &str, words: Option<&str>) -> String {
         "TAU" | "OMEGA" | "KAPPA" | "FACTOR" => "float | Literal[\"auto\"]",
         "TOL" => "float | bool",
         "T" => "float | Literal[\"auto\"] | Sequence[float]",
-        "SIGMA" | "P" => "float | str | Any",
-        "T1,T2,..." => "Sequence[float]",
+        "SIGMA" | "P" | "F" | "V" => "float | str | Any",
+        "T1,T2,..." | "A,L" => "Sequence[float]",
         "J1,J2,..." => "Sequence[int]",
         "SHAPE" => "Any",
         "KEY=V1,V2,..." => "Mapping[str, Sequence[Any]]",
         "NAME=CONDITION" => "str | Sequence[str]",
-        "FLOW" | "GAMMA" | "M" | "LO..=HI" | "PROPERTY" | "NAME" | "LENGTH,TIME" | "I/N" => "str",
+        "FLOW" | "GAMMA" | "M" | "WHAT" | "LO..=HI" | "PROPERTY" | "NAME" | "LENGTH,TIME" | "I/N" => "str",
         other => panic!("a key has a value {other}, of which the type in Python is not known: name it here"),
     };
     own.to_owned()

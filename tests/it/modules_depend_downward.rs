@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 46] = [
+const LAYERS: [&str; 47] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -28,6 +28,7 @@ const LAYERS: [&str; 46] = [
     "flow/crystal",
     "flow/equilibrium",
     "flow/flow",
+    "flow/forcing",
     "flow/solver",
     "flow/scheme",
     "flow",

@@ -457,7 +457,7 @@ fn random_polygons_relax_unless_128_nodes_do_not_resolve_them() {
             Status::Singular => {
                 assert!(mollified.sharp || mollified.crossed || outcome.self_crossing.is_some(), "{line}");
             }
-            Status::Stalled | Status::Nonfinite | Status::Unfinished => panic!("{line}"),
+            Status::Stalled | Status::Nonfinite | Status::Unfinished | Status::Vanished => panic!("{line}"),
         }
     }
     let relaxed =

@@ -15,8 +15,8 @@ TABLES = ["summary.csv", "members.csv", "levels.csv", "ensemble.csv", "explained
 INTEGERS = {
     "summary.csv": ["member", "cell", "steps", "rejected", "sweeps_k", "sweeps_x", "turning", "solves",
                     "points"],
-    "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "t_relax_known",
-                     "rate_known", "discretisation_known", "t_limit_known"],
+    "ensemble.csv": ["cell", "members", "relaxed", "unfinished", "singular", "nonfinite", "stalled", "vanished",
+                     "t_relax_known", "rate_known", "discretisation_known", "t_limit_known", "t_vanish_known"],
     "members.csv": ["member", "cell", "convex"],
     "explained.csv": ["cell", "members", "censored"],
     "levels.csv": ["member", "level", "cell", "points", "solves"],

@@ -21,7 +21,7 @@ use crate::{
 };
 
 /// Every key that can be swept, with values for it. Values that contain commas are why `;` separates them.
-const KEYS: [(&str, &[&str]); 23] = [
+const KEYS: [(&str, &[&str]); 24] = [
     ("points", &["13", "16", "24", "37"]),
     ("seed", &["1", "2", "77"]),
     (
@@ -35,6 +35,7 @@ const KEYS: [(&str, &[&str]); 23] = [
     ("flow", &["surface-diffusion", "willmore", "elastic:0.5", "poly:0,-0.3", "poly:0.1,0,-0.5,0.01"]),
     ("energy", &["cos:3,0.03", "cos:2,0.1,20"]),
     ("diffusivity", &["cos:2,0.3"]),
+    ("drive", &["0.3", "-0.1", "feedback:0.5,4"]),
     ("tau", &["1e-3", "5e-4", "2e-4"]),
     ("adaptive", &["1e-1", "3e-2", "1e-2"]),
     ("t-end", &["0.2", "0.5", "0.81"]),
@@ -105,7 +106,7 @@ impl Drawn {
         // values half the time. On a GPU every number of nodes requires compiling a kernel.
         for (key, values) in KEYS {
             let stays = OF_SWEEPS.contains(&key)
-                || (on_the_gpu && ["points", "solver", "energy", "diffusivity"].contains(&key));
+                || (on_the_gpu && ["points", "solver", "energy", "diffusivity", "drive"].contains(&key));
             if !stays && random.below(2) == 0 {
                 set(&mut base, key, values[random.below(values.len())]);
             }

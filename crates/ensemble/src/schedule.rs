@@ -119,6 +119,8 @@ pub struct Output {
     pub snapshot: bool,
     /// Whether a picture of the member during the run is due.
     pub frame: bool,
+    /// Whether its energy is recorded.
+    pub energy: bool,
 }
 
 /// Returns the times at which every member's excess is recorded, both ends included.
@@ -176,18 +178,29 @@ fn at_most(t_end: f64, t: f64) -> f64 {
 impl Outputs {
     /// Creates the outputs of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
     pub fn new(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Outputs {
+        Outputs::with_energies(t_end, series, [snapshots, frames, &[]])
+    }
+
+    /// Creates them with the times of `others`: of snapshots, of frames, and of energies.
+    pub fn with_energies(t_end: f64, series: Option<f64>, others: [&[f64]; 3]) -> Outputs {
         let count = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as usize + 1);
         let rows = SeriesTimes { t_end, every: series.unwrap_or(0.0), count };
-        let output =
-            |t: f64, snapshot: bool| Output { t: at_most(t_end, t), series: false, snapshot, frame: !snapshot };
-        let all = snapshots.iter().map(|t| output(*t, true)).chain(frames.iter().map(|t| output(*t, false)));
-        let mut all: Vec<Output> = all.collect();
+        let output = |t: f64, kind: usize| Output {
+            t: at_most(t_end, t),
+            series: false,
+            snapshot: kind == 0,
+            frame: kind == 1,
+            energy: kind == 2,
+        };
+        let all = others.into_iter().enumerate();
+        let mut all: Vec<Output> = all.flat_map(|(kind, times)| times.iter().map(move |t| output(*t, kind))).collect();
         all.sort_by(|a, b| a.t.total_cmp(&b.t));
         all.dedup_by(|later, earlier| {
             let same = later.t == earlier.t;
             if same {
                 earlier.snapshot |= later.snapshot;
                 earlier.frame |= later.frame;
+                earlier.energy |= later.energy;
             }
             same
         });
@@ -221,7 +234,7 @@ impl Outputs {
             _ => {}
         }
         let row = place - self.others[..before].last().map_or(0, |last| last.without_row);
-        let due = || Output { t: self.rows.time(row), series: true, snapshot: false, frame: false };
+        let due = || Output { t: self.rows.time(row), series: true, snapshot: false, frame: false, energy: false };
         (row < self.rows.count).then(due)
     }
 

@@ -16,7 +16,7 @@ use crate::{
     outcome::linear_rate,
     request::spec::Precision,
     schedule::{Outputs, grid},
-    trajectory::Trajectory,
+    trajectory::{Trajectory, settling_times},
 };
 use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
@@ -104,7 +104,8 @@ impl<'a> Roster<'a> {
                 // The pictures show the start and the end anyway.
                 let inside = if framed { member::TIMES } else { 0 };
                 let frames: Vec<f64> = grid(spec.final_time()).skip(1).take(inside).collect();
-                Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &frames)
+                let energies = settling_times(spec);
+                Outputs::with_energies(spec.final_time(), spec.series, [&spec.snapshots, &frames, &energies])
             };
             cells.iter().map(of_cell).collect()
         };

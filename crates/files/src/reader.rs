@@ -543,7 +543,7 @@ mod tests {
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };
         spec.sweep.set("omega=1,2".parse().unwrap());
-        written.rate_theory = spec.rate_in_theory(&spec.typical(), -6.5);
+        written.rate_theory = spec.rate_in_theory(&spec.typical(), [-6.5, f64::NAN]);
         let read: Vec<Outcome> =
             Summary::open(home.path(), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
         assert_eq!(read, [written.clone()]);

@@ -30,7 +30,7 @@ columns! { Outcome:
     rejected: whole = rejected, "adaptive steps that were refused";
     sweeps_k: whole = sweeps_k, "sweeps on the curvature systems, 0 with the direct solver";
     sweeps_x: whole = sweeps_x, "sweeps on the position systems";
-    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` at which this share of the way of the energy is left";
     t_half: event = t_half, "first time at which the excess reaches half its start";
     rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
     rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
@@ -57,6 +57,8 @@ columns! { Outcome:
     points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
     t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
+    t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a quarter of its length, and the rest is that of a circle; t_end is then a little earlier";
+    reduced_area: optional = reduced_area, "with `--conserve`: 4πA/L² of the last polygon";
 }
 
 columns! { LevelRow:
@@ -410,8 +412,8 @@ pub(crate) mod tests {
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
              mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,\
-             wulff_distance\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,\n"
+             wulff_distance,t_vanish,reduced_area\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,,,\n"
         );
     }
 

@@ -7,13 +7,20 @@
 //! F is positive inwards: a circle of radius R under surface diffusion has R(t) = R₀ - F t. λ and p are the Lagrange
 //! multipliers that keep the length and the area.
 
-use std::{fmt, str::FromStr};
+use std::{
+    f64::consts::{PI, TAU},
+    fmt,
+    str::FromStr,
+};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use curvelax_base::text::number;
 
-use crate::{crystal::parse_numbers, flow::LAW};
+use crate::{
+    crystal::parse_numbers,
+    flow::{Flow, LAW},
+};
 
 /// The place of F among the numbers of a law.
 pub const DRIVE: usize = crate::flow::QUOTIENT + 1;
@@ -29,8 +36,8 @@ pub const KEPT_AREA: usize = DRIVE + 4;
 pub const KEPT_LENGTH: usize = DRIVE + 5;
 
 /// A driving force along the normal, positive inwards, in units of length/time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "String")]
 pub enum Drive {
     /// F, the same everywhere and always.
     Constant(f64),
@@ -62,7 +69,7 @@ pub struct Forcing {
     pub drive: Option<Drive>,
     /// What is kept.
     pub conserved: Option<Conserved>,
-    /// The area and the length at which it is kept; of what is not kept, any number.
+    /// The area and the length at which it is kept, 0 if that of the start; of what is not kept, any number.
     pub kept: [f64; 2],
 }
 
@@ -91,6 +98,69 @@ impl Forcing {
     }
 }
 
+/// What theory says of a nearly round curve.
+impl Forcing {
+    /// Returns whether anything acts beside the flow.
+    pub fn acts(&self) -> bool {
+        self.drive.is_some() || self.conserved.is_some()
+    }
+
+    /// Returns it with the area and the length of the start where none are given.
+    pub fn kept_from(self, start: [f64; 2]) -> Forcing {
+        let [area, length] = self.kept;
+        let or_start = |given: f64, start: f64| if given == 0.0 { start } else { given };
+        Forcing { kept: [or_start(area, start[0]), or_start(length, start[1])], ..self }
+    }
+
+    /// Returns the radius of the circle at which a curve comes to rest, if that follows from what is kept: by those of the
+    /// circles of its area and of its length.
+    pub fn radius_at_rest(&self, of_area: f64, of_length: f64) -> Option<f64> {
+        let [area, length] = self.kept;
+        match self.conserved? {
+            Conserved::Area => Some(if area == 0.0 { of_area } else { (area / PI).sqrt() }),
+            Conserved::Length => Some(if length == 0.0 { of_length } else { length / TAU }),
+            Conserved::AreaAndLength => None,
+        }
+    }
+
+    /// Returns dR/dt of a circle.
+    pub fn growth(&self, flow: &Flow, radius: f64) -> f64 {
+        match self.conserved {
+            // Its area or its length is its radius.
+            Some(_) => 0.0,
+            None => -flow.b(1.0 / radius) - self.drive.map_or(0.0, |drive| drive.at(PI * radius * radius)),
+        }
+    }
+
+    /// Returns the [rate](Flow::linear_rate) at which mode `m` of a circle decays. A force that is the same everywhere has no
+    /// part in it, nor has p. The λ that keeps the length of a circle, `b(1/R) + λ/R = 0`, adds `λ(m²-1)/R²`.
+    pub fn linear_rate(&self, flow: &Flow, m: u32, radius: f64) -> f64 {
+        let free = flow.linear_rate(m, radius);
+        match self.conserved {
+            Some(Conserved::Length) => free - flow.b(1.0 / radius) * (f64::from(m * m) - 1.0) / radius,
+            _ => free,
+        }
+    }
+}
+
+impl Drive {
+    /// Returns it with `factor` times its strength.
+    pub fn scaled(self, factor: f64) -> Drive {
+        match self {
+            Drive::Constant(force) => Drive::Constant(force * factor),
+            Drive::Feedback { gain, area } => Drive::Feedback { gain: gain * factor, area },
+        }
+    }
+
+    /// Returns the force F on a curve of this area.
+    pub fn at(self, area: f64) -> f64 {
+        match self {
+            Drive::Constant(force) => force,
+            Drive::Feedback { gain, area: target } => gain * (area - target),
+        }
+    }
+}
+
 impl Conserved {
     /// Whether the area is kept.
     pub const fn keeps_area(self) -> bool {
@@ -112,6 +182,16 @@ impl fmt::Display for Drive {
         match self {
             Drive::Constant(force) => write!(f, "{}", number(*force)),
             Drive::Feedback { gain, area } => write!(f, "feedback:{},{}", number(*gain), number(*area)),
+        }
+    }
+}
+
+/// A constant force is a number.
+impl Serialize for Drive {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Drive::Constant(force) => serializer.serialize_f64(*force),
+            Drive::Feedback { .. } => serializer.collect_str(self),
         }
     }
 }
@@ -191,6 +271,24 @@ mod tests {
         for text in ["", "1,2", "feedback:1", "feedback:1,-2", "push:1", "nan"] {
             assert!(text.parse::<Drive>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn what_is_kept_decides_on_the_rates_of_willmore_flow_and_a_force_on_the_radius_alone() {
+        let (flow, radius) = (Flow::Willmore, 1.5_f64);
+        let rate =
+            |conserved, m| Forcing { conserved, ..Forcing::default() }.linear_rate(&flow, m, radius) * radius.powi(4);
+        for m in [2, 3, 7] {
+            let m2 = f64::from(m * m);
+            assert!((rate(Some(Conserved::Area), m) - (m2 - 1.0) * (m2 - 1.5)).abs() < 1e-9);
+            assert!((rate(Some(Conserved::Length), m) - (m2 - 1.0).powi(2)).abs() < 1e-9);
+        }
+        let driven = Forcing { drive: Some(Drive::Constant(0.25)), ..Forcing::default() };
+        assert_eq!(driven.growth(&Flow::SurfaceDiffusion, radius), -0.25);
+        assert_eq!(driven.growth(&flow, 1.0), 0.5 - 0.25);
+        assert_eq!(driven.linear_rate(&flow, 3, radius), flow.linear_rate(3, radius));
+        let kept = Forcing { conserved: Some(Conserved::Length), ..driven };
+        assert_eq!(kept.growth(&flow, radius), 0.0);
     }
 
     #[test]

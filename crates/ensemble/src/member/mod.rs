@@ -9,6 +9,7 @@ pub mod mollifier;
 pub mod outline_curve;
 mod outline_set;
 mod read_outlines;
+mod stretch;
 
 pub use mollifier::{Mollified, Treated};
 pub use outline_curve::Variation;
@@ -28,6 +29,7 @@ use mollifier::mollify;
 use outline_curve::{OutlineCurve, Treatment};
 pub(crate) use outline_set::OutlineSet;
 use outline_set::{OutlineCurves, check_equal_points, scale};
+use stretch::Stretch;
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -40,7 +42,7 @@ use curvelax_curve::{
     outlines::{self, Labelled},
     polygon,
 };
-use curvelax_flow::{flow::Flow, solver::ring::MIN_POINTS};
+use curvelax_flow::{flow::Flow, forcing::Forcing, solver::ring::MIN_POINTS};
 
 /// Draws for one member before giving up. By Rice's formula the harshest law allowed, a thousand modes of one size,
 /// still yields two valid draws in a hundred.
@@ -75,6 +77,8 @@ pub struct Member {
     pub given_excess: Option<f64>,
     /// Its law of motion, if each member has its own; otherwise that of the spec.
     pub flow: Option<Flow>,
+    /// What acts beside it, if each member has values of its own; otherwise that of the spec.
+    pub forcing: Option<Forcing>,
     /// The numbers that were drawn for it, in the order of [`Family::drawn`].
     pub drawn: Vec<f64>,
     /// The coefficients of cos mθ and sin mθ in its perturbation, of the lowest [`FEATURE_MODES`] modes m.
@@ -91,6 +95,8 @@ pub struct Family {
     seed: u64,
     /// The spec, if members have values of their own.
     drawn: Option<Arc<Spec>>,
+    /// 4πA/L² to which the curves of all members are stretched.
+    reduced_area: Option<f64>,
     curves: Curves,
     /// Property of the outlines whose values are groups.
     group_by: Option<String>,
@@ -126,6 +132,10 @@ struct MemberCurve {
     factor: RadialFactor,
     /// Its law of motion, if it is not that of all.
     flow: Option<Flow>,
+    /// What acts beside it, if members have values of their own.
+    forcing: Option<Forcing>,
+    /// How the perturbed curve is stretched.
+    stretch: Option<Stretch>,
 }
 
 /// The group of outlines that do not have the property.
@@ -240,6 +250,7 @@ impl Family {
             perturbation,
             seed,
             drawn,
+            reduced_area: typical_reduced_area(spec),
             curves,
             group_by: spec.group_by.clone(),
             sampling,
@@ -266,7 +277,8 @@ impl Family {
         let (sampler, scales) = (Arc::clone(&other.sampler), Arc::clone(&other.scales));
         let Spec { perturbation, seed, .. } = *spec;
         let drawn = drawn(spec);
-        Ok(Family { sampler, law, perturbation, seed, drawn, directions, scales, ..other.clone() })
+        let reduced_area = typical_reduced_area(spec);
+        Ok(Family { sampler, law, perturbation, seed, drawn, reduced_area, directions, scales, ..other.clone() })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points; or for
@@ -357,13 +369,19 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if no draw leaves the radius positive.
     pub fn member(&self, index: u64) -> Result<Member> {
-        let MemberCurve { own, factor, flow } = self.own_curve(index)?;
+        let MemberCurve { own, factor, flow, forcing, stretch } = self.own_curve(index)?;
         let sampler =
             own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.sampling, self.points())).transpose()?;
         let own = own.as_ref().unwrap_or(&self.outline_curve);
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
-        let mut nodes = sampler.sample(&factor);
+        let stretched = stretch.map(|stretch| stretch.of(sampler.curve(), &factor));
+        let stretched = stretched.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
+        let mut nodes = match &stretched {
+            Some(sampler) => sampler.sample(&RadialFactor::default()),
+            None => sampler.sample(&factor),
+        };
         let mollified = match self.has_corners {
+            // A stretch keeps the area.
             true => mollify(&mut nodes, || sampler.area(&factor), sampler.curve().is_simple()),
             false => Mollified::default(),
         };
@@ -382,8 +400,21 @@ impl Family {
         let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
-        let given_excess = own.given_excess(&factor);
-        Ok(Member { index, cell: 0, label, group, nodes, origin, mollified, given_excess, flow, drawn, coefficients })
+        let given_excess = own.given_excess(&factor).filter(|_| stretched.is_none());
+        Ok(Member {
+            index,
+            cell: 0,
+            label,
+            group,
+            nodes,
+            origin,
+            mollified,
+            given_excess,
+            flow,
+            forcing,
+            drawn,
+            coefficients,
+        })
     }
 
     /// The curve of member `index` before it is sampled, perturbed, at any u, and its law of motion, if it has its own.
@@ -391,9 +422,10 @@ impl Family {
     /// # Errors
     /// As [`Family::member`].
     pub fn curve(&self, index: u64) -> Result<(impl Fn(f64) -> DVec2 + use<>, Option<Flow>)> {
-        let MemberCurve { own, factor, flow, .. } = self.own_curve(index)?;
+        let MemberCurve { own, factor, flow, stretch, .. } = self.own_curve(index)?;
         let curve = own.map_or_else(|| self.sampler.curve().clone(), |own| own.curve);
-        Ok((move |u| factor.apply(curve.centroid(), curve.point(u)), flow))
+        let placed = move |u| factor.apply(curve.centroid(), curve.point(u));
+        Ok((move |u| stretch.map_or_else(|| placed(u), |stretch| stretch.apply(placed(u))), flow))
     }
 
     fn own_curve(&self, index: u64) -> Result<MemberCurve> {
@@ -406,11 +438,15 @@ impl Family {
             }
             _ => None,
         };
+        let forcing = values.as_ref().map(|values| values.forcing);
+        let reduced = values.as_ref().map_or(self.reduced_area, |values| values.reduced_area);
+        let curve = own.as_ref().map_or_else(|| self.sampler.curve(), |own: &OutlineCurve| &own.curve);
+        let stretch = reduced.map(|reduced| Stretch::to(reduced, curve, &factor, index)).transpose()?;
         let flow = values.and_then(|values| match values.flow {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
         });
-        Ok(MemberCurve { own, factor, flow })
+        Ok(MemberCurve { own, factor, flow, forcing, stretch })
     }
 
     /// The first coefficients of a member's perturbation. Where others are perturbed, a member that is not has zeros.
@@ -484,6 +520,11 @@ impl Family {
 /// The law of the perturbation at the typical values, whose modes all members have.
 fn law(spec: &Spec) -> Result<RadialLaw> {
     RadialLaw::new(*spec.amplitude.typical(), spec.modes, *spec.decay.typical())
+}
+
+/// The reduced area of all members, if it is given.
+fn typical_reduced_area(spec: &Spec) -> Option<f64> {
+    spec.reduced_area.as_ref().map(|drawn| *drawn.typical())
 }
 
 /// The spec, without its lists, if members have values of their own.

@@ -16,7 +16,8 @@ use curvelax_base::error::Result;
 use curvelax_curve::{DESCRIPTORS, Modes, descriptors, polygon};
 
 /// Keys on which the features depend.
-const KEYS: [&str; 7] = ["shape", "flow", "energy", "diffusivity", "amplitude", "decay", "modes"];
+const KEYS: [&str; 9] =
+    ["shape", "flow", "energy", "diffusivity", "drive", "amplitude", "decay", "reduced-area", "modes"];
 
 /// The features of a member: a number for each of [`Spec::cell_features`], NaN if unknown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -96,7 +97,10 @@ impl Spec {
 /// The features of members for which so many numbers of each key are drawn, with these modes of the perturbation.
 fn features(drawn: [usize; DRAWN], modes: &[u32]) -> Vec<Feature> {
     let drawn = drawn_names(drawn).into_iter().map(|name| {
-        let (key, rank) = name.split_once('_').unwrap_or((&name, "1"));
+        let (key, rank) = match &*name {
+            "reduced_area" => ("reduced-area", "1"),
+            name => name.split_once('_').unwrap_or((name, "1")),
+        };
         let meaning = format!("number {rank} that is drawn for --{key}");
         Feature::new(name, meaning)
     });

@@ -123,7 +123,7 @@ impl RefinementLevel {
             // A member that relaxes just in time needs longer where nodes are few.
             t_end: Some(FinalTime::At((LONGER * of.final_time()).min(LATEST))),
             // What may happen after it is also judged.
-            stop_when_relaxed: Some(of.event.is_empty() || of.stops_when_relaxed()),
+            stop_when_relaxed: Some(!of.keeps_both() && (of.event.is_empty() || of.stops_when_relaxed())),
             series: None,
             snapshots: Vec::new(),
             store: Store::Csv,

@@ -26,15 +26,15 @@ const NEAR: f64 = 1e-9;
 /// The rate that a member of `spec` with these values should have by linear theory; `None` without one.
 pub fn rate_of(spec: &Spec, values: &MemberValues, outcome: &Outcome) -> Option<f64> {
     match *values.flow {
-        Flow::Elastic(penalty) if penalty > 0.0 => {
+        Flow::Elastic(penalty) if penalty > 0.0 && !values.forcing.acts() => {
             let decay = Decline::new(spec, values, outcome.start.area)?;
             // Theory knows no mobility: its time is that of length⁴.
             let (t, level) = decay.known_point(spec, outcome);
             let rate = outcome.rate.and_then(|_| decay.rate_in_window((spec.mobility() * t, level)));
             rate.map(|rate| spec.mobility() * rate)
         }
-        Flow::Elastic(_) => None,
-        _ => spec.rate_in_theory(values, outcome.start.area),
+        Flow::Elastic(_) if !values.forcing.acts() => None,
+        _ => spec.rate_in_theory(values, [outcome.start.area, outcome.start.length]),
     }
 }
 
@@ -56,6 +56,9 @@ struct Decline<'a> {
 impl Decline<'_> {
     fn new<'a>(spec: &Spec, values: &'a MemberValues, area: f64) -> Option<Decline<'a>> {
         let Flow::Elastic(penalty) = *values.flow else { return None };
+        if values.forcing.acts() {
+            return None;
+        }
         let mode = spec.slowest_mode(values)?;
         let start = area.abs() / std::f64::consts::PI;
         let known = penalty > 0.0 && start > 0.0 && start.is_finite();

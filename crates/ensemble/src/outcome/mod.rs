@@ -120,6 +120,10 @@ pub struct Outcome {
     pub t_data_error: Option<f64>,
     /// Of a crystal, the distance of the last polygon from the Wulff shape of its area, as a length.
     pub wulff_distance: Option<f64>,
+    /// When it shrank to a point, driven by a force.
+    pub t_vanish: Option<f64>,
+    /// 4πA/L² of the last polygon, if area or length are kept.
+    pub reduced_area: Option<f64>,
     /// First times of the [events](crate::Event) of the spec, in their order.
     pub events: Vec<Option<f64>>,
     /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.

@@ -45,4 +45,8 @@ pub struct Paused {
     pub events: Vec<Option<f64>>,
     /// Travel at which it is next checked for crossings.
     pub look_at: f64,
+    /// Time at which steps end because a driven member might vanish in them.
+    pub until: f64,
+    /// Times and energies so far, if these decide on its relaxation.
+    pub energies: Vec<[f64; 2]>,
 }

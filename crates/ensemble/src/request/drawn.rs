@@ -16,6 +16,7 @@ use curvelax_curve::Shape;
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
+    forcing::Drive,
 };
 
 /// What may be drawn.
@@ -31,6 +32,11 @@ pub trait Drawable: Clone + PartialEq + fmt::Display + Serialize {
 
     /// The value that a number is, if it is one.
     fn of_number(number: f64) -> Option<Self>;
+
+    /// Whether `text` is a value that is no number, of those that may be one.
+    fn is_text(_: &str) -> bool {
+        false
+    }
 
     /// Whether parentheses in `text` are those of distributions.
     fn has_distributions(text: &str) -> bool {
@@ -64,6 +70,22 @@ impl Drawable for Shape {
     /// Names of files have parentheses of their own.
     fn has_distributions(text: &str) -> bool {
         text.contains('(') && !text.starts_with("file:")
+    }
+}
+
+impl Drawable for Drive {
+    const EXPECTED: &'static str = "a number, or text such as \"feedback:1,3.14\" or \"uniform(0.1..1)\"";
+
+    fn read(text: &str) -> Result<Drive, String> {
+        text.parse()
+    }
+
+    fn of_number(number: f64) -> Option<Drive> {
+        number.is_finite().then_some(Drive::Constant(number))
+    }
+
+    fn is_text(text: &str) -> bool {
+        text.trim().parse::<f64>().is_err()
     }
 }
 
@@ -267,7 +289,7 @@ impl<T: Drawable> de::Visitor<'_> for DrawnVisitor<T> {
 
     fn visit_str<E: de::Error>(self, text: &str) -> Result<Drawn<T>, E> {
         // A number in quotes is a mistake, as for all other keys.
-        if T::of_number(0.0).is_some() && !T::has_distributions(text) {
+        if T::of_number(0.0).is_some() && !T::has_distributions(text) && !T::is_text(text) {
             return Err(E::invalid_type(de::Unexpected::Str(text), &self));
         }
         text.parse().map_err(E::custom)

@@ -24,6 +24,7 @@ use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
+    forcing::{Conserved, Drive},
     number::Precision,
     solver::Order,
 };
@@ -191,12 +192,16 @@ keys! {
         modes: Modes = Modes { low: 2, high: 8 }, "LO..=HI", Ensemble;
         /// Power p: mode m has standard deviation σ m^-p; or a distribution [default: 1]
         decay: Drawn<f64> = 1.0.into(), "P", Ensemble;
+        /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi A/L^2, 0.05 to
+        /// 1; or a distribution. Needs --conserve area,length [default: as it is]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reduced_area: Option<Drawn<f64>> = None, "V", Ensemble;
         /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos and
         /// sin with the same power [default: amplitude-phase]
         #[serde(skip_serializing_if = "Perturbation::is_default")]
         perturbation: Perturbation = Perturbation::default(), "LAW", Ensemble;
-        /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity,
-        /// --amplitude and --decay: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
+        /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity, --drive,
+        /// --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
         /// [default: random]
         #[serde(skip_serializing_if = "Design::is_random")]
         design: Design = Design::default(), "DESIGN", Ensemble;
@@ -212,6 +217,18 @@ keys! {
         /// 0 in all directions; a sum of two as for --energy [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         diffusivity: Option<Drawn<Diffusivity>> = None, "M", Evolution;
+        /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface diffusion has
+        /// R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any number may be a distribution
+        /// [default: 0]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        drive: Option<Drawn<Drive>> = None, "F", Evolution;
+        /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a vesicle: it is
+        /// relaxed when --relax-to of the way of its energy is left [default: neither]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        conserve: Option<Conserved> = None, "WHAT", Evolution;
+        /// The area and the length that are kept; one number if one is [default: those of the polygon at the start]
+        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
+        conserve_at: Option<Vec<f64>> = None, "A,L", Evolution;
         /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in results,
         /// are then in its unit of time [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -227,7 +244,7 @@ keys! {
         #[serde(skip_serializing_if = "Option::is_none")]
         adaptive: Option<f64> = None, "TOL", Evolution, or "0.001";
         /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
-        /// predicts for its cell. T1,T2,...: one for each cell of a sweep [default: 2]
+        /// predicts for its cell; if --drive makes it vanish, when it has. T1,T2,...: one for each cell of a sweep [default: 2]
         #[serde(skip_serializing_if = "Option::is_none")]
         t_end: Option<FinalTime> = None, "T", Evolution;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
@@ -271,7 +288,7 @@ keys! {
         /// Use it for rough outlines [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_at: Option<f64> = None, "EXCESS", Evolution;
-        /// End a member as soon as it is relaxed [default: false, true with --t-end auto]
+        /// End a member as soon as it is relaxed [default: false; with --t-end auto true, unless it is driven to vanish]
         #[serde(skip_serializing_if = "Option::is_none")]
         stop_when_relaxed: Option<bool> = None, "BOOL", Evolution;
         /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n → ∞:

@@ -11,11 +11,13 @@ use crate::request::sweep::{self, Sweep};
 use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
 use curvelax_curve::Interpolation;
 
+use crate::request::drawn::Drawn;
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
     key::{HelpHeading, OmittedKeys, Spec, SpecKey},
     units::Units,
 };
+use curvelax_flow::forcing::{Conserved, Drive};
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
@@ -195,7 +197,19 @@ impl Spec {
 
     /// Whether a member ends when it is relaxed.
     pub fn stops_when_relaxed(&self) -> bool {
-        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto))
+        self.stop_when_relaxed
+            .unwrap_or(self.t_end == Some(FinalTime::Auto) && !(self.may_vanish() || self.keeps_both()))
+    }
+
+    /// Whether both area and length are kept, so that the end is no circle, and known only when it is reached.
+    pub fn keeps_both(&self) -> bool {
+        self.conserve == Some(Conserved::AreaAndLength) || self.sweep.has("conserve")
+    }
+
+    /// Whether members are driven inwards by a constant force, at least some: they are followed until they vanish.
+    fn may_vanish(&self) -> bool {
+        let inwards = |drive: &Drawn<Drive>| matches!(drive.typical(), Drive::Constant(force) if *force > 0.0);
+        self.drive.as_ref().is_some_and(inwards) || self.sweep.has("drive")
     }
 
     /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
@@ -216,9 +230,10 @@ impl Spec {
     }
 
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
-    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals there is no other.
+    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals, and where
+    /// something is kept, there is no other.
     pub fn is_geometric(&self) -> bool {
-        self.form == Some(PositionForm::Geometric) || self.has_crystals()
+        self.form == Some(PositionForm::Geometric) || self.has_crystals() || self.conserve.is_some()
     }
 
     /// Whether energy or mobility depend on the direction.
@@ -289,7 +304,16 @@ mod tests {
             design: Design::Sobol,
             ..Spec::default()
         };
-        for spec in [spec, adaptive, own, drawn, Spec::default()] {
+        let driven = Spec { drive: Some("0.5".parse().unwrap()), ..Spec::default() };
+        let fed_back = Spec { drive: Some("feedback:uniform(1..2),3".parse().unwrap()), ..Spec::default() };
+        let kept = Spec {
+            flow: Flow::Willmore.into(),
+            conserve: Some(Conserved::AreaAndLength),
+            conserve_at: Some(vec![3.0, 9.5]),
+            reduced_area: Some("uniform(0.5..0.9)".parse().unwrap()),
+            ..Spec::default()
+        };
+        for spec in [spec, adaptive, own, drawn, driven, fed_back, kept, Spec::default()] {
             let text = spec.to_toml().unwrap();
             assert_eq!(Spec::from_toml(&text).unwrap(), spec, "{text}");
         }
@@ -319,6 +343,10 @@ mod tests {
         let optional = [
             "energy",
             "diffusivity",
+            "drive",
+            "conserve",
+            "conserve-at",
+            "reduced-area",
             "outlines",
             "group-by",
             "interpolate",

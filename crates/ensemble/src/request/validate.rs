@@ -3,17 +3,22 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
+use std::f64::consts::PI;
+
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
     BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm,
     Precision, Pull, ROUNDINGS, Sor, Spec, Store, Tau, final_times,
 };
+use crate::request::values::check_reduced_area;
 use curvelax_base::{
     error::{Error, Result},
     text::{count, number},
 };
+use curvelax_curve::Sampling;
 use curvelax_flow::{
     flow::Flow,
+    forcing::Conserved,
     solver::{Facts, ring::MIN_POINTS},
 };
 
@@ -28,8 +33,8 @@ const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
 const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// Keys that are chosen for an uncertainty.
 const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
-/// Keys that make a crystal.
-const CRYSTAL: [&str; 2] = ["energy", "diffusivity"];
+/// Keys with which the force of the polygon moves the nodes.
+const GEOMETRIC: [&str; 3] = ["energy", "diffusivity", "conserve"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
 const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 /// The rows of a resident member stay in memory until it ends.
@@ -57,6 +62,7 @@ impl Spec {
         self.check_method()?;
         self.check_drawn()?;
         self.check_crystals()?;
+        self.check_forcing()?;
         self.check_rounding()?;
         self.check_relaxation()?;
         self.check_combinations()?;
@@ -80,13 +86,16 @@ impl Spec {
         self.t_end.get_or_insert(DEFAULT_T_END.into());
         if self.stops_when_relaxed() {
             self.stop_when_relaxed = Some(true);
+        } else if self.t_end == Some(FinalTime::Auto) && (self.sweep.has("drive") || self.sweep.has("conserve")) {
+            // Cells whose members vanish must not differ in it from those whose members grow.
+            self.stop_when_relaxed = Some(false);
         }
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
         }
-        if self.has_crystals() {
+        if self.has_crystals() || self.conserve.is_some() {
             self.form = Some(PositionForm::Geometric);
-        } else if self.form == Some(PositionForm::Paper) && !CRYSTAL.into_iter().any(|key| self.sweep.has(key)) {
+        } else if self.form == Some(PositionForm::Paper) && !GEOMETRIC.into_iter().any(|key| self.sweep.has(key)) {
             self.form = None;
         }
     }
@@ -350,6 +359,98 @@ impl Spec {
         }
     }
 
+    /// Refuses what a driven flow does not have.
+    fn check_forcing(&self) -> Result<()> {
+        self.check_conserved()?;
+        self.check_stretch()?;
+        let Some(drive) = &self.drive else { return Ok(()) };
+        if let Some(conserved) = self.conserve {
+            let problem = format!("a flow is driven or keeps something, and --conserve {conserved} is given");
+            return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
+        }
+        if self.refine {
+            let problem =
+                format!("its intervals were calibrated without a driving force, and --drive {drive} is given");
+            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+        }
+        Ok(())
+    }
+
+    /// Refuses what a flow that keeps its area or its length does not have.
+    fn check_conserved(&self) -> Result<()> {
+        let Some(conserved) = self.conserve else {
+            return match &self.conserve_at {
+                Some(at) if !self.sweep.has("conserve") => {
+                    let problem = "nothing is kept there";
+                    Err(Error::value("conserve-at", listed(at), problem, "add --conserve, or leave it out"))
+                }
+                _ => Ok(()),
+            };
+        };
+        let refused = |problem: &str, allowed: &str| Err(Error::value("conserve", conserved, problem, allowed));
+        if self.has_crystals() || *self.flow.typical() == Flow::SurfaceDiffusion {
+            let allowed = "leave it out, or use --flow willmore, elastic or poly";
+            return refused("surface diffusion keeps the area anyway, and could not keep the length", allowed);
+        }
+        if self.form == Some(PositionForm::Paper) {
+            let problem = format!("it would not keep anything exactly, and --conserve {conserved} is given");
+            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
+        }
+        if self.refine {
+            let problem =
+                format!("its intervals were calibrated without constraints, and --conserve {conserved} is given");
+            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+        }
+        if conserved == Conserved::AreaAndLength {
+            if let Some(excess) = self.relax_at {
+                let problem = "with area and length the excess stays as it is";
+                return Err(Error::value("relax-at", number(excess), problem, "use --relax-to, a share of the energy"));
+            }
+            if self.stop_when_relaxed == Some(true) {
+                let problem = "with area and length the end is known only when it is reached";
+                return Err(Error::value("stop-when-relaxed", true, problem, "leave it out"));
+            }
+        }
+        self.check_kept(conserved)
+    }
+
+    /// Checks the numbers of `--conserve-at`.
+    fn check_kept(&self, conserved: Conserved) -> Result<()> {
+        let Some(at) = &self.conserve_at else { return Ok(()) };
+        let refused = |problem: &str, allowed: &str| Err(Error::value("conserve-at", listed(at), problem, allowed));
+        let count = if conserved == Conserved::AreaAndLength { 2 } else { 1 };
+        if at.len() != count {
+            let problem = format!("--conserve {conserved} keeps {count} of the two");
+            return refused(&problem, if count == 2 { "give the area and the length" } else { "give one number" });
+        }
+        if !at.iter().all(|number| *number > 0.0 && number.is_finite()) {
+            return refused("not an area or a length", "use finite numbers above 0");
+        }
+        match at[..] {
+            [area, length] if length * length < 4.0 * PI * area => {
+                let least = number((4.0 * PI * area).sqrt());
+                refused("a circle of this area is longer", &format!("use a length above {least}, or a smaller area"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn check_stretch(&self) -> Result<()> {
+        let Some(reduced) = &self.reduced_area else { return Ok(()) };
+        let refused = |problem: &str, allowed: &str| Err(Error::value("reduced-area", reduced, problem, allowed));
+        if self.conserve != Some(Conserved::AreaAndLength) && !self.sweep.has("conserve") {
+            return refused("it changes unless area and length are kept", "add --conserve area,length");
+        }
+        if let Some(at) = &self.conserve_at {
+            let problem = format!("--conserve-at {} gives another one", listed(at));
+            return refused(&problem, "leave out one of the two");
+        }
+        if self.sampling == Sampling::Points {
+            return refused("points that are nodes stay where they are", "use --sampling arclength");
+        }
+        check_reduced_area(*reduced.typical())
+    }
+
     fn check_rounding(&self) -> Result<()> {
         match self.rounding {
             Some(share) if share != 0.0 && !ROUNDINGS.contains(&share) => {
@@ -505,6 +606,11 @@ pub(crate) fn tightest_adaptive(precision: Precision) -> f64 {
 /// The problem of a redistribution that is too fast for fixed steps.
 pub(crate) fn overshooting(omega: f64, tau: f64) -> String {
     format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
+}
+
+/// Numbers with commas between them.
+fn listed(numbers: &[f64]) -> String {
+    numbers.iter().copied().map(number).collect::<Vec<_>>().join(",")
 }
 
 fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {

@@ -15,6 +15,7 @@ use curvelax_curve::{Interpolation, Modes, Perturbation, Sampling, Shape};
 use curvelax_flow::{
     crystal::{Diffusivity, Energy},
     flow::Flow,
+    forcing::{Conserved, Drive},
     number::Precision,
     solver::{MULTIGRID, Order},
 };
@@ -105,9 +106,10 @@ macro_rules! values {
 values! { Takes::Number, whole; u32, u64, usize }
 values! { Takes::Number, real; f64 }
 values! { Takes::Number, str::parse;
-    Drawn<Diffusivity>, Drawn<Energy>, Drawn<Flow>, Drawn<Shape>, Drawn<f64>, FinalTime, Modes, Omega, Pull, Shard, Sor, Tau,
+    Drawn<Diffusivity>, Drawn<Drive>, Drawn<Energy>, Drawn<Flow>, Drawn<Shape>, Drawn<f64>, FinalTime, Modes, Omega, Pull,
+    Shard, Sor, Tau,
 }
-values! { Takes::Text, str::parse; Units }
+values! { Takes::Text, str::parse; Conserved, Units }
 values! { Takes::Text, |word: &str| Ok(word.to_owned()); String }
 values! { Takes::Switch, |word: &str| word.parse().map_err(|_| "neither true nor false".to_string()); bool }
 

@@ -2,11 +2,12 @@
 //!
 //! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
 //! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
-//! through, in the order shape, flow, amplitude, decay, energy, diffusivity.
+//! through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive,
+//! reduced area.
 
 use std::{
     borrow::Cow,
-    f64::consts::PI,
+    f64::consts::{PI, TAU},
     fmt,
     sync::{Mutex, PoisonError},
 };
@@ -18,11 +19,13 @@ use crate::{
 use curvelax_base::{
     error::{Error, Result, echo},
     random::{Design, Distribution, DrawAddress, MAX_SOBOL},
+    text::number,
 };
 use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::{
     crystal::{Crystal, Diffusivity, Energy},
     flow::Flow,
+    forcing::{Conserved, Drive, Forcing},
 };
 
 /// Maximum number of members that are shown one by one.
@@ -33,11 +36,13 @@ const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
 /// The keys whose values may be drawn.
-const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity"];
+const KEYS: [&str; DRAWN] = ["shape", "flow", "amplitude", "decay", "energy", "diffusivity", "drive", "reduced-area"];
 /// Their number.
-pub(crate) const DRAWN: usize = 6;
+pub(crate) const DRAWN: usize = 8;
 /// Those that are numbers, and so have one.
-const NUMBERS: [&str; 2] = ["amplitude", "decay"];
+const NUMBERS: [&str; 3] = ["amplitude", "decay", "reduced-area"];
+/// Reduced areas: a circle has 1, and thin curves have no room for nodes.
+const REDUCED_AREAS: std::ops::RangeInclusive<f64> = 0.05..=1.0;
 /// Bits of the places of a key.
 const PLACE_BITS: u32 = 16;
 
@@ -48,10 +53,14 @@ pub struct MemberValues<'a> {
     pub shape: Cow<'a, Shape>,
     /// The law of motion.
     pub flow: Cow<'a, Flow>,
+    /// What acts beside it, for unit mobility.
+    pub forcing: Forcing,
     /// σ of the perturbation.
     pub amplitude: f64,
     /// p of the perturbation.
     pub decay: f64,
+    /// 4πA/L² to which its curve is stretched.
+    pub reduced_area: Option<f64>,
 }
 
 impl Spec {
@@ -64,9 +73,23 @@ impl Spec {
                 self.energy.as_ref().map(|energy| *energy.typical()),
                 self.diffusivity.as_ref().map(|diffusivity| *diffusivity.typical()),
             ),
+            forcing: self.forcing(self.drive.as_ref().map(|drive| *drive.typical())),
             amplitude: *self.amplitude.typical(),
             decay: *self.decay.typical(),
+            reduced_area: self.reduced_area.as_ref().map(|drawn| *drawn.typical()),
         }
+    }
+
+    /// What acts beside the flow, with this driving force, whose time becomes that of unit mobility.
+    fn forcing(&self, drive: Option<Drive>) -> Forcing {
+        let drive = drive.map(|drive| drive.scaled(1.0 / self.mobility()));
+        let kept = match (self.conserve, self.conserve_at.as_deref()) {
+            (Some(Conserved::Area), Some([area])) => [*area, 0.0],
+            (Some(Conserved::Length), Some([length])) => [0.0, *length],
+            (_, Some([area, length])) => [*area, *length],
+            _ => [0.0; 2],
+        };
+        Forcing { drive, conserved: self.conserve, kept }
     }
 
     /// The flow, with the energy and the mobility if they depend on the direction.
@@ -128,8 +151,8 @@ impl Spec {
 
     /// Whether each member has a law of motion of its own.
     pub fn has_drawn_flow(&self) -> bool {
-        let [_, flow, _, _, energy, diffusivity] = self.distributions();
-        [flow, energy, diffusivity].into_iter().any(|of_key| !of_key.is_empty())
+        let [_, flow, _, _, energy, diffusivity, drive, _] = self.distributions();
+        [flow, energy, diffusivity, drive].into_iter().any(|of_key| !of_key.is_empty())
     }
 
     /// Whether several members are made of one of many outlines.
@@ -195,6 +218,7 @@ impl Spec {
         let of_energy = || Some(told("energy", self.energy.as_ref()?, self.energy.as_ref()?.refusal()?));
         let of_diffusivity =
             || Some(told("diffusivity", self.diffusivity.as_ref()?, self.diffusivity.as_ref()?.refusal()?));
+        let of_drive = || Some(told("drive", self.drive.as_ref()?, self.drive.as_ref()?.refusal()?));
         let of_law = || {
             let [_, _, amplitude, decay, ..] = self.distributions();
             let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
@@ -210,7 +234,19 @@ impl Spec {
                 if amplitude.is_empty() { ("decay", &self.decay) } else { ("amplitude", &self.amplitude) };
             Some(told(drawn.0, drawn.1, reason?))
         };
-        of_shape().or_else(of_flow).or_else(of_energy).or_else(of_diffusivity).or_else(of_law)
+        let of_motion = of_flow().or_else(of_energy).or_else(of_diffusivity).or_else(of_drive);
+        of_shape().or(of_motion).or_else(of_law).or_else(|| self.refusal_of_reduced_area())
+    }
+
+    /// The same for the reduced area.
+    fn refusal_of_reduced_area(&self) -> Option<String> {
+        let drawn = self.reduced_area.as_ref()?;
+        let of: Vec<&Distribution> = drawn.distributions().iter().collect();
+        let reason = refusal(&of, |numbers| match drawn.at(numbers) {
+            Ok(reduced) => check_reduced_area(reduced).err().map(|error| error.to_string()),
+            Err(message) => Some(message),
+        });
+        Some(format!("--reduced-area {}: {}", echo(drawn), reason?))
     }
 
     /// Checks the values of `member`, as for [`Spec::values`].
@@ -219,6 +255,7 @@ impl Spec {
     /// [`Error::Request`] for values that cannot be.
     pub(crate) fn check_values(&self, member: u64) -> Result<()> {
         let values = self.values(member)?;
+        values.reduced_area.map_or(Ok(()), check_reduced_area)?;
         RadialLaw::new(values.amplitude, self.modes, values.decay).map(drop)
     }
 
@@ -232,7 +269,7 @@ impl Spec {
 
     /// The distributions of each key.
     pub(crate) fn distributions(&self) -> [&[Distribution]; DRAWN] {
-        let Spec { shape, flow, amplitude, decay, energy, diffusivity, .. } = self;
+        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, reduced_area, .. } = self;
         let energy = energy.as_ref().map_or(&[][..], Drawn::distributions);
         let diffusivity = diffusivity.as_ref().map_or(&[][..], Drawn::distributions);
         [
@@ -242,6 +279,8 @@ impl Spec {
             decay.distributions(),
             energy,
             diffusivity,
+            drive.as_ref().map_or(&[][..], Drawn::distributions),
+            reduced_area.as_ref().map_or(&[][..], Drawn::distributions),
         ]
     }
 
@@ -254,16 +293,20 @@ impl Spec {
     }
 
     fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
-        let [shape, flow, amplitude, decay, energy, diffusivity] = self.numbers(uniform);
+        let [shape, flow, amplitude, decay, energy, diffusivity, drive, reduced] = self.numbers(uniform);
         let of_energy = self.energy.as_ref().map(|drawn| own("energy", drawn, &energy)).transpose()?;
         let of_diffusivity =
             self.diffusivity.as_ref().map(|drawn| own("diffusivity", drawn, &diffusivity)).transpose()?;
+        let of_drive = self.drive.as_ref().map(|drawn| own("drive", drawn, &drive)).transpose()?;
+        let of_reduced = self.reduced_area.as_ref().map(|drawn| own("reduced-area", drawn, &reduced)).transpose()?;
         let flow = own("flow", &self.flow, &flow)?;
         Ok(MemberValues {
             shape: own("shape", &self.shape, &shape)?,
             flow: self.law_of_motion(flow, of_energy.map(|of| *of), of_diffusivity.map(|of| *of)),
+            forcing: self.forcing(of_drive.map(|of| *of)),
             amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
             decay: *own("decay", &self.decay, &decay)?,
+            reduced_area: of_reduced.map(|of| *of),
         })
     }
 
@@ -284,6 +327,21 @@ impl Spec {
     }
 }
 
+/// Checks a reduced area.
+///
+/// # Errors
+/// [`Error::Request`] if no curve to stretch has it.
+pub(crate) fn check_reduced_area(reduced: f64) -> Result<()> {
+    match REDUCED_AREAS.contains(&reduced) {
+        true => Ok(()),
+        false => {
+            let (low, high) = (number(*REDUCED_AREAS.start()), number(*REDUCED_AREAS.end()));
+            let allowed = format!("use a number from {low} to {high}");
+            Err(Error::value("reduced-area", number(reduced), "not 4 pi A/L^2 of a curve that nodes resolve", &allowed))
+        }
+    }
+}
+
 /// [`Flow::excess_rate`]. That of a crystal takes a millisecond, so the last one is kept: most members have the same.
 fn excess_rate(flow: &Flow, mode: u32, area: f64) -> Option<f64> {
     static LAST: Mutex<Option<(Crystal, u32, Option<f64>)>> = Mutex::new(None);
@@ -300,7 +358,7 @@ fn excess_rate(flow: &Flow, mode: u32, area: f64) -> Option<f64> {
 /// The names of the numbers that are drawn, so many for each key.
 pub(crate) fn drawn_names(counts: [usize; DRAWN]) -> Vec<String> {
     let name = |key: usize, rank: usize| match KEYS[key] {
-        key if NUMBERS.contains(&key) => key.into(),
+        key if NUMBERS.contains(&key) => key.replace('-', "_"),
         key => format!("{key}_{}", rank + 1),
     };
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
@@ -317,9 +375,9 @@ fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Resu
 
 /// What linear theory says about a member of a spec.
 impl Spec {
-    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow.
-    pub fn growth(&self, flow: &Flow, area: f64) -> Option<f64> {
-        flow.growth(area).map(|growth| growth / self.mobility())
+    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow, if that is all that acts.
+    pub fn growth(&self, flow: &Flow, forcing: &Forcing, area: f64) -> Option<f64> {
+        flow.growth(area).filter(|_| !forcing.acts()).map(|growth| growth / self.mobility())
     }
 
     /// The lowest mode, 2 or more, of a member with these values: it decays last.
@@ -328,12 +386,20 @@ impl Spec {
         values.shape.lowest_mode().into_iter().chain(drawn).min()
     }
 
-    /// The rate at which, by linear theory, the excess of a member of area `area` falls once only the slowest mode is
+    /// The rate at which, by linear theory, the excess of a member of this area and length falls once only the slowest mode is
     /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
-    /// [`Flow::excess_rate`].
-    pub fn rate_in_theory(&self, values: &MemberValues, area: f64) -> Option<f64> {
-        let rate = excess_rate(&values.flow, self.slowest_mode(values)?, area)?;
-        Some(if values.flow.growth(area).is_some() { rate } else { self.mobility() * rate })
+    /// [`Flow::excess_rate`]. A driven one has none, since its radius changes; one that keeps area or length keeps the radius.
+    pub fn rate_in_theory(&self, values: &MemberValues, [area, length]: [f64; 2]) -> Option<f64> {
+        let (flow, forcing, mode) = (&values.flow, &values.forcing, self.slowest_mode(values)?);
+        let radius = match (forcing.conserved, forcing.drive) {
+            (None, None) => {
+                let rate = excess_rate(flow, mode, area)?;
+                return Some(if flow.growth(area).is_some() { rate } else { self.mobility() * rate });
+            }
+            (Some(_), None) => forcing.radius_at_rest((area.abs() / PI).sqrt(), length / TAU)?,
+            _ => return None,
+        };
+        Some(2.0 * self.mobility() * forcing.linear_rate(flow, mode, radius)).filter(|rate| rate.is_finite())
     }
 
     /// The mean excess that the perturbation of a circle has in each mode from 2 on: ½ (m²-1) a_m².

@@ -246,6 +246,7 @@ impl Study {
             let own = cell.settled();
             cell.spec = own.map_err(|error| spec.sweep.in_cell(error, cell.index))?;
             cell.check_draws().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
+            cell.check_stretch().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
             cell.check_refinement().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
         }
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
@@ -291,6 +292,9 @@ const OF_THESE: &str = "standard errors and intervals take copies of one outline
                         outlines, not for a population of which they are a sample";
 
 const NARROW: &str = "narrow the distribution, or cut it: LAW in A..B";
+
+/// Members that are stretched before the run, to refuse what cannot be: each takes a millisecond.
+const STRETCHED: usize = 256;
 
 /// How many times more nodes are looked for where so few cannot be refined.
 const MOST_MORE: usize = 8;
@@ -365,6 +369,12 @@ impl Cell {
         let (more, all) = (refused.count(), self.spec.member_count());
         let more = if more == 0 { String::new() } else { format!(" and {more} more") };
         Err(Error::Request(format!("{error}, for member {member}{more} of {all}; {NARROW}")))
+    }
+
+    /// Checks that the first members can be stretched as asked.
+    fn check_stretch(&self) -> Result<()> {
+        let asked = self.spec.reduced_area.is_some();
+        self.members().take(if asked { STRETCHED } else { 0 }).try_for_each(|member| self.member(member).map(drop))
     }
 
     /// Checks that its members have limits, if these are asked for.

@@ -16,8 +16,12 @@
 //! flowers, the nonconvex curve, the astroid and islands under many flows, to shares of the excess from 0.5 to 10⁻⁶
 //! (table in docs/internals/method.md).
 //!
+//! A driving force F adds -F to R', and to first order nothing to the rates. A flow that keeps the area or the length keeps
+//! the radius of the circle of that area or length; the multiplier λ of the length, b(1/R) + λ/R = 0, changes the rates
+//! ([`Forcing::linear_rate`]).
+//!
 //! The excess of a crystal over its Wulff shape has its own size, by the surface energy of the curve, and falls at its
-//! slowest rate.
+//! slowest rate. A driven one is none of theory: a force that is the same in all directions has another shape at rest.
 
 use std::f64::consts::TAU;
 
@@ -29,6 +33,7 @@ use curvelax_flow::{
     crystal::{Energy, HIGHEST_WAVE},
     equilibrium::Equilibrium,
     flow::Flow,
+    forcing::{Conserved, Forcing},
 };
 
 /// The highest mode that is followed; higher ones vanish before they matter.
@@ -110,16 +115,22 @@ impl CurveScale {
     }
 
     /// The radius from which the theory starts.
-    pub fn first_radius(&self, flow: &Flow) -> f64 {
+    pub fn first_radius(&self, flow: &Flow, forcing: &Forcing) -> f64 {
         match flow {
+            _ if forcing.conserved.is_some() => {
+                forcing.radius_at_rest(self.radius, self.radius_of_length).unwrap_or(self.radius_of_length)
+            }
             Flow::SurfaceDiffusion => (self.radius * self.radius_of_length).sqrt(),
             _ => self.radius_of_length,
         }
     }
 
-    /// The time after which the excess has fallen to `threshold`, with `more` excess in the modes from 2 on, by theory;
+    /// The time after which the excess has fallen to `threshold`, for unit mobility, with `more` excess in the modes from 2 on, by theory;
     /// `None` if by theory it never does, and for a curve that is not simple.
-    pub fn relaxes_after(&self, flow: &Flow, more: &[f64], threshold: f64) -> Option<f64> {
+    pub fn relaxes_after(&self, flow: &Flow, forcing: &Forcing, more: &[f64], threshold: f64) -> Option<f64> {
+        if forcing.conserved == Some(Conserved::AreaAndLength) || (flow.is_crystal() && forcing.acts()) {
+            return None;
+        }
         if flow.is_crystal() {
             let fall = (self.excess_under(flow) + more.iter().sum::<f64>()) / threshold;
             let t = fall.max(1.0).ln() / (2.0 * flow.linear_rate(2, self.radius));
@@ -129,7 +140,7 @@ impl CurveScale {
         let count = self.parts.len().max(more.len());
         let part = |parts: &[f64], i: usize| parts.get(i).copied().unwrap_or(0.0);
         let mut parts: Vec<f64> = (0..count).map(|i| part(&self.parts, i) + part(more, i)).collect();
-        let start = self.first_radius(flow);
+        let start = self.first_radius(flow, forcing);
         let (mut radius, mut t) = (start, 0.0);
         let most = GROWN * parts.iter().sum::<f64>();
         for _ in 0..MAX_STEPS {
@@ -137,8 +148,8 @@ impl CurveScale {
             if excess <= threshold {
                 return self.simple.then_some(t);
             }
-            let slope = -flow.b(1.0 / radius);
-            let rate = |i: usize| 2.0 * (flow.linear_rate(i as u32 + 2, radius) + slope / radius);
+            let slope = forcing.growth(flow, radius);
+            let rate = |i: usize| 2.0 * (forcing.linear_rate(flow, i as u32 + 2, radius) + slope / radius);
             let fall = parts.iter().enumerate().map(|(i, part)| part * rate(i)).sum::<f64>() / excess;
             let h = STEP / fall.abs().max(slope.abs() / radius);
             parts.iter_mut().enumerate().for_each(|(i, part)| *part *= (-h * rate(i)).exp());
@@ -199,7 +210,7 @@ mod tests {
             let (scale, m2) = (wavy(m, 1e-3, radius), f64::from(m * m));
             let threshold = scale.excess / fall;
             let near = |found: Option<f64>, exact: f64| (found.unwrap() / exact - 1.0).abs() < 0.06;
-            let time = |flow: Flow| scale.relaxes_after(&flow, &[], threshold);
+            let time = |flow: Flow| scale.relaxes_after(&flow, &Forcing::default(), &[], threshold);
             let r4 = radius.powi(4);
             assert!(near(time(Flow::SurfaceDiffusion), fall.ln() * r4 / (2.0 * m2 * (m2 - 1.0))), "mode {m}");
             let exponent = (m2 - 1.0) * (m2 - 1.5) + 0.5;
@@ -213,19 +224,24 @@ mod tests {
     fn modes_beyond_the_slowest_leave_first() {
         // A hundredth of the excess in mode 2, the rest in mode 6: to half of it only mode 6 matters.
         let both = curve(400, |t| DVec2::from_angle(t) * (1.0 + 1e-3 * (6.0 * t).cos() + 3e-4 * (2.0 * t).cos()));
-        let time = |share: f64| both.relaxes_after(&Flow::SurfaceDiffusion, &[], share * both.excess).unwrap();
+        let time = |share: f64| {
+            both.relaxes_after(&Flow::SurfaceDiffusion, &Forcing::default(), &[], share * both.excess).unwrap()
+        };
         let (half, hundredth) = (time(0.5), time(1e-4));
         assert!((half / (2_f64.ln() / 2520.0) - 1.0).abs() < 0.1 && hundredth > 0.1, "{half} {hundredth}");
         // More excess in mode 2 takes longer.
         let more = [both.excess];
-        assert!(both.relaxes_after(&Flow::SurfaceDiffusion, &more, 0.5 * both.excess).unwrap() > 10.0 * half);
+        assert!(
+            both.relaxes_after(&Flow::SurfaceDiffusion, &Forcing::default(), &more, 0.5 * both.excess).unwrap()
+                > 10.0 * half
+        );
     }
 
     #[test]
     fn a_time_scales_with_the_fourth_power_of_the_length_without_rounding() {
         let time = |radius: f64| {
             let scale = wavy(3, 0.2, radius);
-            scale.relaxes_after(&Flow::SurfaceDiffusion, &[], 0.01 * scale.excess).unwrap()
+            scale.relaxes_after(&Flow::SurfaceDiffusion, &Forcing::default(), &[], 0.01 * scale.excess).unwrap()
         };
         assert_eq!(time(1024.0), time(1.0) * 1024_f64.powi(4));
         assert_eq!(time(2_f64.powi(-30)), time(1.0) * 2_f64.powi(-120));
@@ -234,13 +250,17 @@ mod tests {
     #[test]
     fn a_flow_that_makes_a_curve_vanish_or_unstable_has_no_time_and_neither_has_an_immersed_one() {
         let scale = wavy(2, 0.01, 1.0);
-        let to = |flow: &str, share: f64| scale.relaxes_after(&flow.parse().unwrap(), &[], share * scale.excess);
+        let to = |flow: &str, share: f64| {
+            scale.relaxes_after(&flow.parse().unwrap(), &Forcing::default(), &[], share * scale.excess)
+        };
         // The circle vanishes at t = 1/160, and the excess goes as a power of what is left.
         assert!(to("poly:0,0,40", 0.01).is_some() && to("poly:0,0,40", 1e-60).is_none());
         // b' = -10 makes mode 2 grow on the unit circle.
         assert_eq!(to("poly:-10", 0.01), None);
         let eight = curve(400, |t| DVec2::new(t.sin(), t.sin() * t.cos()));
-        assert!(!eight.simple && eight.relaxes_after(&Flow::SurfaceDiffusion, &[], 0.01).is_none());
+        assert!(
+            !eight.simple && eight.relaxes_after(&Flow::SurfaceDiffusion, &Forcing::default(), &[], 0.01).is_none()
+        );
         assert!((eight.radius - eight.radius_of_length).abs() == 0.0);
     }
 }

@@ -3,3 +3,4 @@
 pub(crate) mod horizon;
 pub(crate) mod rates;
 pub(crate) mod times;
+pub(crate) mod vanishing;

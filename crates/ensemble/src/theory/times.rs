@@ -7,6 +7,7 @@ use crate::{
     request::validate::{MAX_OMEGA_TAU, MAX_STEPS, overshooting},
     theory::horizon::CurveScale,
     theory::rates::{own_omega, own_tau, strongest_pull},
+    theory::vanishing::vanishes_after,
 };
 use curvelax_base::{
     error::{Error, Result},
@@ -18,6 +19,11 @@ use curvelax_base::{
 const MARGIN: f64 = 6.0;
 /// Factor on the mean excess of the perturbation: one of two standard deviations.
 const PERTURBED: f64 = 4.0;
+/// The cap for members that vanish over the life of a circle of the area of the curve.
+const VANISHED_MARGIN: f64 = 2.0;
+/// The same for members that keep area and length, in units of the fourth power of the radius of the circle of that length: the
+/// energy of a 3:1 ellipse is at rest to 10⁻⁷ at a tenth of that.
+const SETTLED: f64 = 0.5;
 /// Bits of a cap, which nobody needs to a digit: few enough that it is the same on every machine.
 const CAP_BITS: u32 = 8;
 /// R⁴ of the curve for which the default numbers are meant, the paper's 2:1 ellipse, and the factor either way within
@@ -63,8 +69,29 @@ pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
     let scale = &scales[0];
     let rate = rate(spec, scale);
     let (omega, tau) = (own_omega(rate), own_tau(rate));
-    let all = [far_omega(spec, omega), far_tau(spec, tau), far_end(spec, scale), strong_crystal(spec)];
+    let all = [
+        far_omega(spec, omega),
+        far_tau(spec, tau),
+        far_end(spec, scale),
+        strong_crystal(spec),
+        not_followed(spec, scale),
+    ];
     all.into_iter().flatten().collect()
+}
+
+fn not_followed(spec: &Spec, scale: &CurveScale) -> Option<String> {
+    let values = spec.typical();
+    let life = vanishes_after(&values.flow, &values.forcing, scale.radius)? / spec.mobility();
+    if !scale.simple || life > spec.final_time() {
+        return None;
+    }
+    let (life, drive) = (short(life), spec.drive.as_ref()?);
+    let problem = match (spec.pace(), spec.pull) {
+        (Pace::Fixed(_), _) => "steps of one length do not follow them to it: use --adaptive --pull auto",
+        (Pace::Adaptive(_), Pull::Rate(0.0)) => "without --pull auto their lengths drift on the way",
+        _ => return None,
+    };
+    Some(format!("--drive {drive}: members vanish at about {life}, and {problem}"))
 }
 
 fn strong_crystal(spec: &Spec) -> Option<String> {
@@ -109,9 +136,13 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
 
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
     let values = spec.typical();
+    // A driven curve goes on when it has relaxed, and of one that keeps both theory knows nothing.
+    if values.forcing.drive.is_some() || spec.keeps_both() {
+        return None;
+    }
     let (t_end, expected) = (spec.final_time(), expected(spec, &values, scale));
     // A curve that starts nearly round is expected to rest.
-    let slowest = expected.max(scale.first_radius(&values.flow).powi(4) / (4.0 * spec.mobility()));
+    let slowest = expected.max(scale.first_radius(&values.flow, &values.forcing).powi(4) / (4.0 * spec.mobility()));
     let what = match () {
         () if t_end < expected / FAR_END => "is far too early for a member to relax",
         () if t_end > slowest * FAR_END && !spec.stops_when_relaxed() => "is long after a member has relaxed",
@@ -134,10 +165,27 @@ pub fn is_far(spec: &Spec, scales: &[CurveScale]) -> bool {
 
 /// The time at which a member ends if it has not relaxed: the latest for any of the probes.
 fn cap(spec: &Spec, scales: &[CurveScale]) -> f64 {
-    // That of a curve which is not simple is no time that it needs.
-    let margin = |scale: &CurveScale| if scale.simple { MARGIN } else { 1.0 };
-    let caps = probes(spec, scales).map(|(values, scale)| margin(scale) * expected(spec, &values, scale));
+    let caps = probes(spec, scales).map(|(values, scale)| own_cap(spec, &values, scale));
     rounded_up(caps.fold(0.0, f64::max))
+}
+
+/// That time for members with these values: when they have relaxed, or vanished if that comes for sure.
+fn own_cap(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
+    if spec.keeps_both() {
+        return SETTLED * scale.first_radius(&values.flow, &values.forcing).powi(4) / spec.mobility();
+    }
+    match life(spec, values, scale) {
+        Some(t) => t,
+        // That of a curve which is not simple is no time that it needs.
+        None if scale.simple => MARGIN * expected(spec, values, scale),
+        None => expected(spec, values, scale),
+    }
+}
+
+/// A time at which members with these values have vanished for sure, if they do.
+fn life(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> Option<f64> {
+    let of_circle = vanishes_after(&values.flow, &values.forcing, scale.radius).filter(|_| scale.simple);
+    of_circle.map(|t| VANISHED_MARGIN * t / spec.mobility())
 }
 
 /// The time that a member needs to relax, by theory. Where theory has none, that of surface diffusion in the slowest
@@ -147,8 +195,8 @@ fn expected(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
     let own = |factor: f64| parts.iter().map(|part| factor * part).collect::<Vec<_>>();
     let start = scale.excess_under(&values.flow) + own(1.0).iter().sum::<f64>();
     let threshold = spec.threshold(start);
-    let fourth = scale.first_radius(&values.flow).powi(4) / spec.mobility();
-    match scale.relaxes_after(&values.flow, &own(PERTURBED), threshold) {
+    let fourth = scale.first_radius(&values.flow, &values.forcing).powi(4) / spec.mobility();
+    match scale.relaxes_after(&values.flow, &values.forcing, &own(PERTURBED), threshold) {
         Some(t) if t > 0.0 => t / spec.mobility(),
         // It is round already.
         Some(_) => fourth / 24.0,
@@ -177,7 +225,11 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
     check_redistribution(spec, own_omega(rate), own_tau(rate))?;
     // A small member need not last as long as the largest one does.
     let ends_itself = (spec.has_drawn_values() || spec.outlines.is_some()) && spec.stops_when_relaxed();
-    let own_end = || if ends_itself { MARGIN * expected(spec, values, scale) } else { f64::INFINITY };
+    let own_end = || match life(spec, values, scale) {
+        Some(t) => t,
+        None if ends_itself => MARGIN * expected(spec, values, scale),
+        None => f64::INFINITY,
+    };
     check_steps(spec, own_end, own_omega(rate), own_tau(rate))?;
     let most = strongest_pull(rate, n);
     match spec.pull {

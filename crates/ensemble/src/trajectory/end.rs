@@ -1,5 +1,7 @@
 //! The end of a member's trajectory: its results.
 
+use std::f64::consts::PI;
+
 use glam::DVec2;
 
 use super::{Course, Time, Trajectory, watch::ROUND};
@@ -55,11 +57,21 @@ impl Trajectory<'_> {
         let p = progress;
         let relaxed = inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
         let halved = inside(self.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
-        let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
-        let t_half = if self.start.excess <= ROUND { Some(0.0) } else { halved };
+        let [t_relax, t_half] = match &self.settling {
+            Some(settling) if self.is_at_end() => settling.times(self.t_end, self.report.now.energy / self.unit),
+            Some(_) => [None; 2],
+            None => {
+                let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
+                [t_relax, if self.start.excess <= ROUND { Some(0.0) } else { halved }]
+            }
+        };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         // What happens to a curve at rest takes nothing from its time.
-        let status = if t_relax.is_some() { Status::Relaxed } else { failed.unwrap_or(Status::Unfinished) };
+        let status = match failed {
+            Some(Status::Vanished) => Status::Vanished,
+            _ if t_relax.is_some() => Status::Relaxed,
+            failed => failed.unwrap_or(Status::Unfinished),
+        };
         let (rate, rate_r2) = self.rate().unzip();
         let (origin, unit) = (self.member.origin, self.unit);
         let before = || self.member.nodes.iter().map(|node| *node + origin).collect::<Vec<DVec2>>();
@@ -69,6 +81,7 @@ impl Trajectory<'_> {
             Equilibrium::Circle => None,
             Equilibrium::Wulff(energy) => Some(outcome::wulff_distance(&after(), &energy)).filter(|d| d.is_finite()),
         };
+        let end = Observables::new(&self.report.now, progress.turning, unit);
         let outcome = Outcome {
             member: self.member.index,
             cell: self.member.cell,
@@ -85,13 +98,15 @@ impl Trajectory<'_> {
             rate_theory: None,
             start: self.start,
             turn: polygon::largest_turn(&self.member.nodes),
-            end: Observables::new(&self.report.now, progress.turning, unit),
+            end,
             self_crossing: self.crossed,
             solves: self.counters.solves.into(),
             label: std::mem::take(&mut self.member.label),
             group: std::mem::take(&mut self.member.group),
             points: self.member.nodes.len() as u64,
             wulff_distance,
+            t_vanish: self.t_vanish,
+            reduced_area: self.conserved.then(|| 4.0 * PI * end.area / (end.length * end.length)),
             events: self.watches.iter().map(|watch| watch.t).collect(),
             ..Outcome::default()
         };

@@ -8,11 +8,16 @@
 mod end;
 mod events;
 mod outputs;
+mod settling;
 mod start;
+mod vanishing;
 mod watch;
 
 use glam::DVec2;
 
+use settling::Settling;
+pub(crate) use settling::settling_times;
+use vanishing::Vanishing;
 use watch::{Watch, aim_at_levels};
 
 use crate::{
@@ -54,6 +59,8 @@ enum Course {
     Unresolved,
     /// It is not a simple curve: whatever its excess, it does not relax to a circle.
     Immersed,
+    /// It keeps its excess; its energy is followed to the end.
+    Settling,
 }
 
 /// How a member's time advances.
@@ -115,6 +122,14 @@ pub struct Trajectory<'a> {
     portrait: bool,
     /// What its flow relaxes curves to.
     equilibrium: Equilibrium,
+    /// Whether it may shrink to a point, driven by a force.
+    vanishing: Option<Vanishing>,
+    /// When it did.
+    t_vanish: Option<f64>,
+    /// Its energy, if that decides on its relaxation.
+    settling: Option<Settling>,
+    /// Whether it keeps its area or its length.
+    conserved: bool,
 }
 
 impl Trajectory<'_> {
@@ -142,6 +157,8 @@ impl Trajectory<'_> {
             crossed: self.crossed,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             look_at: self.launch.parameters.look_at,
+            until: self.vanishing.as_ref().map_or(0.0, |own| own.until),
+            energies: self.settling.as_ref().map_or(Vec::new(), |own| own.energies.clone()),
         }
     }
 
@@ -150,7 +167,8 @@ impl Trajectory<'_> {
     /// # Errors
     /// [`Error::Request`] if a different member was paused.
     pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
-        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at } = paused;
+        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at, until, energies } =
+            paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
         let served = usize::try_from(served).unwrap_or(usize::MAX);
         let others = events.len() != self.watches.len();
@@ -170,8 +188,16 @@ impl Trajectory<'_> {
         (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
         (self.rows, self.frames) = (rows, frames);
         (self.served, self.crossed) = (served, crossed);
+        if let Some(own) = &mut self.settling {
+            own.energies = energies;
+        }
         self.sweeps = sweeps;
         self.take(counters, &report);
+        if let Some(own) = &mut self.vanishing {
+            own.until = until;
+        }
+        // One that is so small goes on because it does not vanish in time.
+        self.vanishing.take_if(|own| own.is_due(&self.report.now));
         Ok(())
     }
 
@@ -185,6 +211,7 @@ impl Trajectory<'_> {
         if creeps || (failed && self.is_timed_too_coarsely()) {
             self.counters.status = Status::Stalled as u32;
         }
+        self.look_whether_it_vanishes();
     }
 
     /// Whether even the shortest step that the clock can count was longer than the curve needed at its start.
@@ -192,6 +219,25 @@ impl Trajectory<'_> {
         let Time::Adaptive(ticks) = self.time else { return false };
         let edge = self.start.length / self.unit / self.member.nodes.len() as f64;
         ticks.tick > FASTEST * edge.powi(4)
+    }
+
+    /// Ends the member if it is at the length at which that is decided, and vanishes before its final time.
+    fn look_whether_it_vanishes(&mut self) {
+        let now = Observables::new(&self.report.now, 1.0, self.unit);
+        let due = |own: &mut Vanishing| self.counters.status == 0 && own.is_due(&self.report.now);
+        if let Some(own) = self.vanishing.take_if(due) {
+            // The unit of time over that of length to the fourth is the inverse mobility.
+            let inverse_mobility = self.time_unit / self.unit.powi(4);
+            let at = own.left(&now).map(|left| self.now() + left * inverse_mobility);
+            self.t_vanish = at.filter(|t| *t <= self.t_end);
+            if self.t_vanish.is_some() {
+                self.counters.status = Status::Vanished as u32;
+            }
+        }
+        let time = self.report.progress.time_high + self.report.progress.time_low;
+        if let Some(own) = self.vanishing.as_mut().filter(|own| own.until <= time) {
+            own.look_ahead(time, &now, self.unit);
+        }
     }
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {
@@ -265,6 +311,9 @@ impl Trajectory<'_> {
         let steps = self.counters.steps;
         let mut parameters = self.launch.parameters;
         aim_at_levels(&mut parameters, &self.watches);
+        if let Some(vanishing) = &self.vanishing {
+            vanishing.aim(&mut parameters);
+        }
         let output = self.outputs.get(self.served).map(|output| output.t);
         let goal = match self.time {
             Time::Fixed(clock) => {
@@ -278,10 +327,19 @@ impl Trajectory<'_> {
             Time::Adaptive(ticks) => {
                 let end = (parameters.end_high, parameters.end_low);
                 let split = |t: f64| if t >= self.t_end { end } else { ticks.split(t / self.time_unit) };
-                (parameters.goal_high, parameters.goal_low) = output.map_or(end, split);
+                let goal = output.map_or(end, split);
+                let until = self.vanishing.as_ref().map_or(f64::INFINITY, |own| own.until);
+                let until = if until * self.time_unit >= self.t_end { end } else { ticks.split(until) };
+                (parameters.end_high, parameters.end_low) = until;
+                (parameters.goal_high, parameters.goal_low) = if is_before(until, goal) { until } else { goal };
                 self.most_steps()
             }
         };
         (goal, parameters)
     }
+}
+
+/// Whether a time in two parts is before another.
+fn is_before(one: (f64, f64), other: (f64, f64)) -> bool {
+    (one.0 - other.0) + (one.1 - other.1) < 0.0
 }

@@ -77,13 +77,18 @@ impl Trajectory<'_> {
     fn emit(&mut self, output: &Output, fraction: f64, state: Option<&State<f64>>) {
         let (member, t, unit) = (self.member.index, output.t, self.unit);
         let curve = state.filter(|_| self.needs_curve(output)).map(|state| self.curve_at(fraction, state));
-        if output.series {
+        if output.series || output.energy {
             let at = match (&curve, self.time) {
                 (Some(curve), Time::Adaptive(_)) => self.observe_inside(fraction, curve),
                 _ => self.report_at(fraction),
             };
             let at = Observables::new(&at, self.report.progress.turning, unit);
-            self.rows.series.push(SeriesRow { member, t, at });
+            if output.series {
+                self.rows.series.push(SeriesRow { member, t, at });
+            }
+            if let (true, Some(settling)) = (output.energy, &mut self.settling) {
+                settling.energies.push([t, at.energy]);
+            }
         }
         if let (true, Some(curve)) = (output.snapshot || output.frame, curve) {
             let origin = self.member.origin;

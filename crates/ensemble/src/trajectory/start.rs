@@ -4,6 +4,8 @@ use glam::DVec2;
 
 use super::{
     Course, FIRST_STEP, Time, Trajectory,
+    settling::Settling,
+    vanishing::Vanishing,
     watch::{ROUND, Watch, resolution},
 };
 use crate::{
@@ -15,6 +17,7 @@ use crate::{
 use curvelax_curve::polygon;
 use curvelax_flow::{
     flow::Flow,
+    forcing::Forcing,
     scheme::{
         Parameters, State,
         extrapolation::most_order,
@@ -44,7 +47,9 @@ impl<'a> Trajectory<'a> {
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let time_unit = unit.powi(4) / spec.mobility();
         let flow = member.flow.clone().unwrap_or_else(|| spec.typical().flow.into_owned());
-        let parameters = parameters(spec, &flow, &nodes, [unit, time_unit], spec.tolerance_at(precision));
+        let forcing = member.forcing.unwrap_or_else(|| spec.typical().forcing);
+        let forcing = forcing.kept_from([polygon::signed_area(&member.nodes), polygon::length(&member.nodes)]);
+        let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order =
@@ -53,13 +58,16 @@ impl<'a> Trajectory<'a> {
         let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
         let start = Observables::new(&launch.report.now, turning, unit);
         let limit = spec.threshold(member.given_excess.unwrap_or(start.excess));
-        let course = Course::of(start.excess, turning, limit, precision);
+        let course = match spec.keeps_both() {
+            true => Course::Settling,
+            false => Course::of(start.excess, turning, limit, precision),
+        };
         set_thresholds(&mut launch, course, start.excess, limit, precision);
         let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
         let clock = time.unit(time_unit);
         launch.parameters.clock_end = spec.final_time() / clock;
         launch.parameters.growth = spec
-            .growth(&flow, start.area)
+            .growth(&flow, &forcing, start.area)
             .map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
             Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
@@ -86,6 +94,10 @@ impl<'a> Trajectory<'a> {
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
+            vanishing: Vanishing::new(flow, forcing, (&start, nodes.len()), unit, precision),
+            t_vanish: None,
+            settling: Settling::of(spec, &start),
+            conserved: forcing.conserved.is_some(),
         };
         trajectory.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
@@ -113,7 +125,7 @@ impl Course {
 /// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.
 fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, precision: Precision) {
     let (resolution, parameters) = (resolution(precision), &mut launch.parameters);
-    let reachable = course != Course::Immersed && excess > ROUND;
+    let reachable = course != Course::Immersed && course != Course::Settling && excess > ROUND;
     let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
     parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };
     parameters.half_at = threshold(0.5 * excess);
@@ -167,24 +179,16 @@ fn beyond(p: &Parameters<f64>, precision: Precision) -> bool {
 }
 
 /// The parameters of a member in the units `unit` of length and `time` of time, except thresholds and times.
-fn parameters(spec: &Spec, flow: &Flow, nodes: &[DVec2], [unit, time]: [f64; 2], tolerance: f64) -> Parameters<f64> {
+fn parameters(
+    spec: &Spec,
+    (flow, forcing): (&Flow, &Forcing),
+    nodes: &[DVec2],
+    [unit, time]: [f64; 2],
+    tolerance: f64,
+) -> Parameters<f64> {
     let rate = relaxation_rate(radius(nodes));
     let mut law = flow.law(unit);
-    {
-        let mut f = curvelax_flow::forcing::Forcing::default();
-        if let Ok(t) = std::env::var("XDRIVE") {
-            f.drive = Some(t.parse().unwrap());
-        }
-        if let Ok(t) = std::env::var("XCONS") {
-            f.conserved = Some(t.parse().unwrap());
-            f.kept = [polygon::signed_area(nodes), polygon::length(nodes)];
-        }
-        if let Ok(t) = std::env::var("XAT") {
-            let (a, b) = t.split_once(',').unwrap();
-            f.kept = [a.parse().unwrap(), b.parse().unwrap()];
-        }
-        f.write(&mut law, unit);
-    }
+    forcing.write(&mut law, unit);
     Parameters {
         law,
         tau: match spec.pace() {

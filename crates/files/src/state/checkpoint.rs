@@ -229,6 +229,8 @@ mod tests {
 
     fn paused(at: f64) -> Paused {
         Paused {
+            until: 2.0 * at,
+            energies: vec![[0.0, at]],
             counters: Counters { steps: 7, ..Counters::default() },
             report: Report::default(),
             state: vec![at, f64::NAN, -0.0],

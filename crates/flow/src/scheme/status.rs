@@ -1,7 +1,7 @@
 //! How a member ends: the codes that the kernel and its twin write to [`Counters`](super::member::Counters).
 //!
-//! A step decides on failure in `evolve.rs`. The host decides on members that end as they start, creep, or reach their
-//! final time, in `crates/ensemble/src/trajectory`.
+//! A step decides on failure in `evolve.rs`. The host decides on members that end as they start, creep, vanish, or
+//! reach their final time, in `crates/ensemble/src/trajectory`.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,12 +23,14 @@ pub enum Status {
     /// The sweep cap was reached, or the sweeps diverged; or adaptive steps stayed so short that the run would never
     /// end.
     Stalled = 5,
+    /// A driving force made it shrink to a point.
+    Vanished = 6,
 }
 
 impl Status {
     /// All statuses, in the order in which tables list them.
-    pub const ALL: [Status; 5] =
-        [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled];
+    pub const ALL: [Status; 6] =
+        [Status::Relaxed, Status::Unfinished, Status::Singular, Status::Nonfinite, Status::Stalled, Status::Vanished];
 
     /// Returns whether the member ended early without having relaxed.
     pub fn is_failure(self) -> bool {
@@ -43,6 +45,7 @@ impl Status {
             Status::Singular => "singular",
             Status::Nonfinite => "nonfinite",
             Status::Stalled => "stalled",
+            Status::Vanished => "vanished",
         }
     }
 }

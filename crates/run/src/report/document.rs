@@ -49,6 +49,7 @@ struct CellDocument<'a> {
     rate: Numbers,
     discretisation: Numbers,
     t_limit: Numbers,
+    t_vanish: Numbers,
     /// By the names of the events.
     events: BTreeMap<&'a str, EventDocument>,
 }
@@ -205,6 +206,7 @@ impl<'a> CellDocument<'a> {
             rate: statistics.rates.numbers.clone(),
             discretisation: statistics.errors(),
             t_limit: statistics.limit(),
+            t_vanish: statistics.vanished(),
             events: spec.event.iter().map(|event| &event.name[..]).zip(events).collect(),
         }
     }

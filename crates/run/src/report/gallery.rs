@@ -64,6 +64,7 @@ text { font-family: sans-serif; font-size: 12px; fill: #24292f }
 .singular path { stroke: #c4262e; fill: #c4262e } .singular .word { fill: #c4262e }
 .nonfinite path { stroke: #8a3ab9; fill: #8a3ab9 } .nonfinite .word { fill: #8a3ab9 }
 .stalled path { stroke: #5a6b00; fill: #5a6b00 } .stalled .word { fill: #5a6b00 }
+.vanished path { stroke: #00737a; fill: #00737a } .vanished .word { fill: #00737a }
 .panel .before { fill: none; stroke: #8c959f }
 .panel .way { fill: none; stroke-opacity: 0.5 }
 .panel .nodes { fill: none }
@@ -82,6 +83,7 @@ text { fill: #e6edf3 }
 .singular path { stroke: #ff7b76; fill: #ff7b76 } .singular .word { fill: #ff7b76 }
 .nonfinite path { stroke: #cf9bf0; fill: #cf9bf0 } .nonfinite .word { fill: #cf9bf0 }
 .stalled path { stroke: #b9cc4a; fill: #b9cc4a } .stalled .word { fill: #b9cc4a }
+.vanished path { stroke: #45c8d0; fill: #45c8d0 } .vanished .word { fill: #45c8d0 }
 .panel .before { fill: none; stroke: #7d8792 }
 .panel .nodes { fill: none }
 }

@@ -4,7 +4,7 @@ use std::{fmt, path::Path, time::Duration};
 
 use super::words::{
     MAX_GROUP, chi, describe, errors, events, law, machine, member_name, member_time, paired, raw, significant, times,
-    unit,
+    unit, vanished,
 };
 use curvelax_base::{
     error::shortened,
@@ -61,6 +61,7 @@ impl fmt::Display for Overview<'_> {
             ("nodes", self.tally.nodes.told().unwrap_or_default()),
             ("accuracy", self.accuracy()),
             ("rate", self.rate()),
+            ("t_vanish", self.vanishing()),
         ]
         .into_iter()
         .chain(self.events().into_iter().map(|text| ("event", text)))
@@ -106,6 +107,11 @@ impl Overview<'_> {
             .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.statistics.of_limits))
     }
 
+    /// When the members of a single ensemble vanished, if any did.
+    fn vanishing(&self) -> String {
+        self.only_cell().and_then(|cell| vanished(self.spec, cell)).unwrap_or_default()
+    }
+
     /// What stands behind the limits of a single ensemble.
     fn raw(&self) -> String {
         let cell = self.only_cell().filter(|_| self.statistics.of_limits);
@@ -131,6 +137,9 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{:<label$}  {title:<columns$}  status", "member", "label")?;
         for ((member, name), time) in self.tally.named.iter().zip(&names).zip(&times) {
             write!(f, "{:<11}{name:<label$}  {time:<columns$}  {}", member.member, member.status.name())?;
+            if let Some(t) = member.t_vanish {
+                write!(f, " at {}", significant(t))?;
+            }
             for (event, t) in self.spec.event.iter().zip(&member.events) {
                 write!(f, "  {} {}", event.name, t.map_or("not seen".into(), significant))?;
             }
@@ -183,6 +192,9 @@ impl Overview<'_> {
             let errors = errors(cell, self.spec);
             if !errors.is_empty() {
                 writeln!(f, "{:<11}{errors}", "")?;
+            }
+            if let Some(vanished) = vanished(self.spec, cell) {
+                writeln!(f, "{:<11}t_vanish {vanished}", "")?;
             }
             events(self.spec, cell).try_for_each(|event| writeln!(f, "{:<11}{event}", ""))?;
         }

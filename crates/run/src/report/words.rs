@@ -46,6 +46,9 @@ pub fn describe(spec: &Spec) -> String {
         ("flow", spec.flow.to_string()),
         ("energy", spec.energy.as_ref().map_or(String::new(), |energy| format!("energy {energy}"))),
         ("diffusivity", spec.diffusivity.as_ref().map_or(String::new(), |of| format!("diffusivity {of}"))),
+        ("drive", spec.drive.as_ref().map_or(String::new(), |drive| format!("drive {drive}"))),
+        ("conserve", spec.conserve.map_or(String::new(), |what| format!("{what} kept"))),
+        ("reduced-area", spec.reduced_area.as_ref().map_or(String::new(), |of| format!("reduced area {of}"))),
         ("amplitude", drawn("amplitude", &spec.amplitude)),
         ("decay", drawn("decay", &spec.decay)),
         ("perturbation", perturbation.into()),
@@ -91,6 +94,19 @@ pub fn place(platform: &Platform) -> String {
     let adapter = adapter.as_ref().map_or(String::new(), |name| format!(" {name}"));
     let precision = format!("{precision:?}").to_lowercase();
     format!("{backend}{adapter}, {precision}")
+}
+
+/// When the members of a cell vanished, if any did.
+pub(super) fn vanished(spec: &Spec, cell: &CellStatistics) -> Option<String> {
+    let EventStatistics { times: of, stopped, .. } = &cell.vanishing;
+    match (of.sample.events(), *stopped) {
+        (0, _) => None,
+        (_, 0) => Some(unit(spec) + &times(of, false)),
+        (known, stopped) => {
+            let stopped = count(stopped, "member");
+            Some(format!("reached by {known}; no statistics, as {stopped} stopped when relaxed"))
+        }
+    }
 }
 
 /// A line for each event of a cell.

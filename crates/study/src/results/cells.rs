@@ -35,6 +35,8 @@ pub struct CellStatistics {
     pub limits: Option<CellLimits>,
     /// The events of the spec, in their order.
     pub events: Vec<EventStatistics>,
+    /// When members vanished, if they are driven.
+    pub vanishing: EventStatistics,
 }
 
 /// An event in one cell.
@@ -138,18 +140,20 @@ impl CellStatistics {
             (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
         let discretisation = DiscretisationError::of(&judged)?;
         let limits = CellLimits::of(&mem::take(&mut tally.limits), &judged, copies)?;
-        let mut of_events = mem::take(&mut tally.events).into_iter();
-        let events = spec.event.iter().map(|_| {
-            let EventTally { times, limits, judged, stopped, .. } = of_events.next().unwrap_or_default();
+        let statistics = |of: EventTally| {
+            let EventTally { times, limits, judged, stopped, .. } = of;
             let discretisation = DiscretisationError::of(&judged)?;
             let (times, limits) = match stopped {
                 0 => (TimeStatistics::new(times), CellLimits::of(&limits, &judged, copies)?),
                 _ => (TimeStatistics::unknown(times), None),
             };
             Ok(EventStatistics { times, discretisation, limits, stopped })
-        });
+        };
+        let mut of_events = mem::take(&mut tally.events).into_iter();
+        let events = spec.event.iter().map(|_| statistics(of_events.next().unwrap_or_default()));
         let events = events.collect::<Result<_>>()?;
-        Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events })
+        let vanishing = statistics(mem::take(&mut tally.vanishing))?;
+        Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events, vanishing })
     }
 
     /// Number of members that ended.
@@ -165,6 +169,13 @@ impl CellStatistics {
     /// The numbers on the limits, for the table.
     pub fn limit(&self) -> Numbers {
         limit(self.limits.as_ref())
+    }
+
+    /// The numbers on the times at which members vanished, for the table.
+    pub fn vanished(&self) -> Numbers {
+        let times = &self.vanishing.times;
+        let named = places(times.quantiles, times.interval()).filter(|of| of.name.starts_with("median"));
+        Numbers { known: times.sample.events(), named: named.collect(), intervals: Vec::new() }
     }
 
     /// The quantities in the table, with their numbers.
@@ -358,6 +369,9 @@ impl EnsembleStatistics {
         all.extend(keys);
         all.push(column("members".into(), "integer", "members that ended".into()));
         all.extend(statuses.chain(numbers).chain(intervals));
+        all.push(column("t_vanish_known".into(), "integer", "members with a t_vanish".into()));
+        let vanished = self.cells.first().map(CellStatistics::vanished);
+        all.extend(vanished.iter().flat_map(|of| &of.named).map(|of| float("t_vanish", of)));
         all
     }
 
@@ -439,7 +453,10 @@ fn table<'a>(
         let values_of = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
         let numbers = quantities.each_ref().map(|(_, numbers)| (numbers.known, values_of(&numbers.named)));
         let intervals = quantities.each_ref().map(|(_, numbers)| values_of(&numbers.intervals));
-        writer.serialize((of.cell, values, of.members(), of.counts, numbers, intervals)).map_err(|e| failed(&e))?;
+        let vanished = of.vanished();
+        let vanished = (vanished.known, values_of(&vanished.named));
+        let row = (of.cell, values, of.members(), of.counts, numbers, intervals, vanished);
+        writer.serialize(row).map_err(|e| failed(&e))?;
     }
     let bytes = writer.into_inner().map_err(|e| failed(&e))?;
     String::from_utf8(bytes).map_err(|e| failed(&e))

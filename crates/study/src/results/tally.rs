@@ -39,6 +39,8 @@ pub struct Tally {
     pub refined: bool,
     /// Whether members end when they are relaxed.
     pub stops: bool,
+    /// Whether a driving force may make members vanish.
+    pub driven: bool,
     /// What distinguishes the cells.
     sweep: Sweep,
     /// Rows of the levels.
@@ -81,6 +83,8 @@ pub struct MemberTime {
     pub t_end: f64,
     /// Its relaxation time.
     pub t_relax: Option<f64>,
+    /// When it vanished.
+    pub t_vanish: Option<f64>,
     /// Its limit.
     pub t_limit: Option<f64>,
     /// Half-width of the 95 % interval of that.
@@ -91,11 +95,12 @@ pub struct MemberTime {
 
 impl MemberTime {
     fn new(outcome: &Outcome, refined: bool) -> MemberTime {
-        let Outcome { member, cell, status, t_end, t_relax, t_limit, t_error, .. } = *outcome;
+        let Outcome { member, cell, status, t_end, t_relax, t_vanish, t_limit, t_error, .. } = *outcome;
         let limit = |i: usize| outcome.limit_of_event(i).filter(|_| refined);
         let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
         let events = outcome.events.iter().enumerate().map(event).collect();
-        MemberTime { member, cell, label: outcome.label.clone(), status, t_end, t_relax, t_limit, t_error, events }
+        let label = outcome.label.clone();
+        MemberTime { member, cell, label, status, t_end, t_relax, t_vanish, t_limit, t_error, events }
     }
 
     /// The time that is shown: the limit, if there is one, with its error.
@@ -149,6 +154,8 @@ pub struct CellTally {
     pub judged: Vec<Limit>,
     /// By event, in the order of the spec.
     pub events: Vec<EventTally>,
+    /// Times at which members vanished, of driven ones.
+    pub vanishing: EventTally,
 }
 
 /// Totals over the members of one cell, for one event.
@@ -166,9 +173,18 @@ pub struct EventTally {
     reached: u64,
 }
 
+/// What decides on how members are counted.
+#[derive(Clone, Copy, Debug)]
+struct Counted {
+    refined: bool,
+    stops: bool,
+    driven: bool,
+}
+
 impl CellTally {
-    fn add(&mut self, outcome: &Outcome, refined: bool, stops: bool) -> Result<()> {
-        let CellTally { counts, times, others, late, area, rates, limits, judged, events, .. } = self;
+    fn add(&mut self, outcome: &Outcome, counted: Counted) -> Result<()> {
+        let Counted { refined, stops, driven } = counted;
+        let CellTally { counts, times, others, late, area, rates, limits, judged, events, vanishing, .. } = self;
         times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
         // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
         let limited = |limit: Option<f64>, t: Option<f64>| match limit {
@@ -189,6 +205,11 @@ impl CellTally {
                 own.limits.push(limited(judged.map(|limit| limit.t), *t))?;
             }
             own.judged.extend(judged);
+        }
+        if driven {
+            vanishing.times.push(Observation::new(outcome.t_vanish, outcome.t_end))?;
+            vanishing.reached += u64::from(outcome.t_vanish.is_some());
+            vanishing.stopped += u64::from(stops && outcome.status == Status::Relaxed);
         }
         *late += u64::from(outcome.status == Status::Unfinished && outcome.end.turning.abs() == 1);
         *area += outcome.start.area.abs();
@@ -273,12 +294,14 @@ impl Tally {
         let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
         let at_start = vec![0; events.len()];
         let stops = spec.stops_when_relaxed();
+        let driven = spec.drive.is_some() || spec.sweep.has("drive");
         let sweep = spec.sweep.clone();
         let has_outlines = spec.rounding.is_some() || spec.sweep.has("rounding");
         Tally {
             has_outlines,
             refined: spec.refine,
             stops,
+            driven,
             sweep,
             levels: levels.rows(),
             events,
@@ -293,15 +316,16 @@ impl Tally {
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let (cell, refined) = (outcome.cell as usize, self.refined);
+        let counted = Counted { refined, stops: self.stops, driven: self.driven };
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
         if self.named.len() < MAX_KNOWN && self.cells[cell].counts.iter().sum::<u64>() < MAX_NAMED {
             self.named.push(MemberTime::new(outcome, refined));
         }
-        self.cells[cell].add(outcome, refined, self.stops)?;
+        self.cells[cell].add(outcome, counted)?;
         if !outcome.group.is_empty() {
-            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, refined, self.stops)?;
+            self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, counted)?;
         }
         if refined {
             self.nodes.add(outcome);
@@ -400,6 +424,7 @@ impl Tally {
                  --tau or --adaptive, or more --points, helps"
             ));
         }
+        warnings.extend(self.vanished());
         warnings.extend(self.late());
         if self.below_rounding > 0 {
             warnings.push(format!(
@@ -449,6 +474,20 @@ impl Tally {
             ));
         }
         warnings
+    }
+
+    /// The warning about members that vanished before they relaxed.
+    fn vanished(&self) -> Option<String> {
+        let rank = Status::ALL.iter().position(|status| *status == Status::Vanished)?;
+        let before: u64 = self.cells.iter().map(|cell| cell.others[rank]).sum();
+        let all = self.members();
+        (before > 0).then(|| {
+            format!(
+                "{before} of {all} {} vanished before they relaxed: to t_relax they are censored then, as if they would relax later; \
+                 see t_vanish",
+                plural(all, "member")
+            )
+        })
     }
 
     /// The warning about cells in which no member relaxed, because the final time came first.

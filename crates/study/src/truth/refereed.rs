@@ -76,12 +76,20 @@ impl RefereeRow {
 /// ```
 ///
 /// # Errors
-/// Those of [`Referee::new`] and [`Referee::time_of_excess`]; an outline of a file is refused.
+/// Those of [`Referee::new`] and [`Referee::time_of_excess`]; an outline of a file and a driving force are refused.
 pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
     let Cell { spec, family, .. } = cell;
     if family.outline(index).is_some() {
         let (problem, remedy) = ("the referee solves for smooth curves, and a polygon has corners", "name a formula");
         return Err(Error::value("shape", &spec.shape, problem, remedy));
+    }
+    if let Some(drive) = &spec.drive {
+        let problem = "the referee solves for flows without a driving force";
+        return Err(Error::value("drive", drive, problem, "leave it out"));
+    }
+    if let Some(conserved) = spec.conserve {
+        let problem = "the referee solves for flows that keep nothing";
+        return Err(Error::value("conserve", conserved, problem, "leave it out"));
     }
     let (point, own) = family.curve(index)?;
     let referee = Referee::new(point, &own.unwrap_or_else(|| spec.typical().flow.into_owned()))?;

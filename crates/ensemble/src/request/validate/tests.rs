@@ -86,6 +86,59 @@ const REFUSED: &[(&str, &str)] = &[
         "diffusivity = 'cos:9,0.5'\npoints = 32",
         "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",
     ),
+    (
+        "drive = 0.5\nrefine = true",
+        "--refine true: its intervals were calibrated without a driving force, and --drive 0.5",
+    ),
+    (
+        "drive = 0.5\nflow = 'willmore'\nconserve = 'length'",
+        "--drive 0.5: a flow is driven or keeps something, and --conserve length is given; leave out one",
+    ),
+    ("conserve = 'area'", "--conserve area: surface diffusion keeps the area anyway, and could not keep the length; "),
+    ("conserve = 'length'\nenergy = 'cos:3,0.05'", "--conserve length: surface diffusion keeps the area anyway"),
+    (
+        "conserve = 'area'\nflow = 'willmore'\nform = 'paper'",
+        "--form paper: it would not keep anything exactly, and --conserve area is given; use --form geometric",
+    ),
+    ("conserve = 'area'\nflow = 'willmore'\nrefine = true", "--refine true: its intervals were calibrated without con"),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nrelax-at = 0.1",
+        "--relax-at 0.1: with area and length the excess stays as it is; use --relax-to",
+    ),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nstop-when-relaxed = true",
+        "--stop-when-relaxed true: with area and length the end is known only when it is reached",
+    ),
+    ("conserve-at = [1]", "--conserve-at 1: nothing is kept there; add --conserve"),
+    (
+        "conserve = 'area'\nflow = 'willmore'\nconserve-at = [1, 9]",
+        "--conserve-at 1,9: --conserve area keeps 1 of the two; give one number",
+    ),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nconserve-at = [1]",
+        "--conserve-at 1: --conserve area,length keeps 2 of the two; give the area and the length",
+    ),
+    ("conserve = 'area'\nflow = 'willmore'\nconserve-at = [-1]", "--conserve-at -1: not an area or a length; "),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nconserve-at = [3, 6]",
+        "--conserve-at 3,6: a circle of this area is longer; use a length above 6.139",
+    ),
+    (
+        "reduced-area = 0.7",
+        "--reduced-area 0.7: it changes unless area and length are kept; add --conserve area,length",
+    ),
+    (
+        "reduced-area = 1.1\nflow = 'willmore'\nconserve = 'area,length'",
+        "--reduced-area 1.1: not 4 pi A/L^2 of a curve that nodes resolve; use a number from 0.05 to 1",
+    ),
+    (
+        "reduced-area = 0.7\nflow = 'willmore'\nconserve = 'area,length'\nconserve-at = [3, 9]",
+        "--reduced-area 0.7: --conserve-at 3,9 gives another one; leave out",
+    ),
+    (
+        "reduced-area = 0.7\nflow = 'willmore'\nconserve = 'area,length'\nsampling = 'points'",
+        "--reduced-area 0.7: points that are nodes stay where they are; use --sampling arclength",
+    ),
     ("mobility = 0", "--mobility 0: not a mobility in length^4/time; use a finite number above 0, for example 1"),
     ("mobility = -1", "--mobility -1: "),
     ("mobility = nan", "--mobility NaN: "),
@@ -146,6 +199,12 @@ const ACCEPTED: &[&str] = &[
     "energy = 'cos:4,0.03'\nform = 'auto'",
     "energy = 'cos:2,0.1,30+cos:4,0.01'\ndiffusivity = 'cos:4,0.5'\nform = 'geometric'",
     "energy = 'cos:4,uniform(0.01..0.03)'",
+    "drive = 0.5\nform = 'paper'",
+    "drive = -0.5\nenergy = 'cos:3,0.05'",
+    "drive = 'feedback:uniform(1..2),3'\nflow = 'willmore'",
+    "conserve = 'area'\nflow = 'elastic:0.5'\nconserve-at = [3]\nform = 'geometric'",
+    "conserve = 'area,length'\nflow = 'poly:0.5'\nreduced-area = 'uniform(0.5..0.9)'\nt-end = 'auto'",
+    "conserve-at = [3]\nflow = 'willmore'\n[sweep]\nconserve = ['area', 'length']",
     "event = []",
     "event = ['a = area <= 1', 'b = area <= 1']",
 ];

@@ -33,6 +33,7 @@ fn colour(status: Status) -> Colour {
         Status::Singular => [0xc4, 0x26, 0x2e],
         Status::Nonfinite => [0x8a, 0x3a, 0xb9],
         Status::Stalled => [0x5a, 0x6b, 0x00],
+        Status::Vanished => [0x00, 0x73, 0x7a],
     }
 }
 

@@ -266,7 +266,7 @@ impl PageTable {
     #[must_use]
     pub fn without_empty_columns(self) -> PageTable {
         let PageTable { caption, header, rows, source } = self;
-        let statuses = ["unfinished", "singular", "nonfinite", "stalled"];
+        let statuses = ["unfinished", "singular", "nonfinite", "stalled", "vanished"];
         let is_kept = |j: usize| {
             let nothing = |text: &str| text.is_empty() || text == "0" && statuses.contains(&&*header[j]);
             rows.is_empty() || !rows.iter().all(|row| row.get(j).is_none_or(|text| nothing(text)))

@@ -287,7 +287,7 @@ fn digits(frame: &[u16]) -> String {
 
 /// The class of a status.
 pub(super) fn colour(status: &str) -> &str {
-    let known = ["relaxed", "unfinished", "singular", "nonfinite", "stalled"];
+    let known = ["relaxed", "unfinished", "singular", "nonfinite", "stalled", "vanished"];
     known.into_iter().find(|name| *name == status).unwrap_or("other")
 }
 

@@ -1,0 +1,109 @@
+//! Members that a driving force shrinks to a point.
+//!
+//! The steps that follow a curve to a point are ever shorter. It is therefore followed to a share of its length, at which
+//! it pauses as for an event. By then it is round, since its relaxation time falls as the fourth power of its
+//! radius and its life as the first, and what is left is the [life of a circle](vanishes_after).
+//!
+//! An adaptive step must not pass the end of that life: nodes would cross the centre, and the curve would grow again, upside
+//! down. Steps therefore end where half of what is left has passed, and again at half of the rest.
+
+use std::f64::consts::PI;
+
+use crate::{Observables, theory::vanishing::vanishes_after};
+use curvelax_flow::{
+    flow::Flow,
+    forcing::Forcing,
+    number::Precision,
+    scheme::{Parameters, member::Observed},
+};
+
+/// Share of the length of a curve at which it ends. With a force of 10/R³ a mode 2 has fallen by a factor e²⁵ by then.
+const LEFT: f64 = 0.25;
+/// The part of the life of a curve after which steps end.
+const PART: f64 = 0.5;
+
+/// A member that may vanish.
+#[derive(Clone, Debug)]
+pub(super) struct Vanishing {
+    flow: Flow,
+    forcing: Forcing,
+    /// The radius of n nodes on a circle over 2A/L.
+    outer: f64,
+    /// The length at which it is decided, in the member's unit, a number of the run's precision.
+    level: f64,
+    /// When half of what was left will have passed, in the member's unit; infinite if it does not vanish.
+    pub(super) until: f64,
+}
+
+impl Vanishing {
+    /// That of a driven simple curve with the observables `start` of so many nodes, in lengths of `unit`.
+    pub(super) fn new(
+        flow: Flow,
+        forcing: Forcing,
+        (start, points): (&Observables, usize),
+        unit: f64,
+        precision: Precision,
+    ) -> Option<Vanishing> {
+        let may = forcing.drive.is_some() && start.turning.abs() == 1;
+        may.then(|| {
+            let level = precision.rounded(LEFT * start.length / unit);
+            let outer = (PI / points as f64).cos().recip();
+            let mut own = Vanishing { flow, forcing, outer, level, until: 0.0 };
+            own.look_ahead(0.0, start, unit);
+            own
+        })
+    }
+
+    /// Sets the time of the next look, from the time `now` of a curve.
+    pub(super) fn look_ahead(&mut self, now: f64, at: &Observables, unit: f64) {
+        let left = self.left(at).map(|left| left / unit.powi(4));
+        self.until = left.map_or(f64::INFINITY, |left| now + PART * left);
+    }
+
+    /// Lets the member pause at the level.
+    pub(super) fn aim(&self, parameters: &mut Parameters<f64>) {
+        parameters.watched = 1.0;
+        parameters.low_length = parameters.low_length.max(self.level);
+    }
+
+    pub(super) fn is_due(&self, now: &Observed<f64>) -> bool {
+        now.length <= self.level
+    }
+
+    /// The time that is left to a curve, for unit mobility. Its area falls at the rate F times its length, so 2A/L is the radius
+    /// that lasts as long; on a circle its nodes are a little outside.
+    pub(super) fn left(&self, at: &Observables) -> Option<f64> {
+        vanishes_after(&self.flow, &self.forcing, self.outer * (2.0 * at.area.abs() / at.length))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_driven_simple_curve_pauses_at_a_quarter_of_its_length() {
+        let start = Observables { length: 8.0, area: 4.0, turning: 1, ..Observables::default() };
+        let of = |drive: Option<&str>, start: &Observables| {
+            let forcing = Forcing { drive: drive.map(|drive| drive.parse().unwrap()), ..Forcing::default() };
+            Vanishing::new(Flow::SurfaceDiffusion, forcing, (start, 4), 2.0, Precision::F32)
+        };
+        let own = of(Some("0.5"), &start).unwrap();
+        let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
+        own.aim(&mut parameters);
+        assert_eq!((parameters.watched, parameters.low_length), (1.0, 1.0));
+        // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of 2.
+        assert!((own.until - 2_f64.sqrt() / 16.0).abs() < 1e-12);
+        // An event at a longer length comes first.
+        parameters.low_length = 3.0;
+        own.aim(&mut parameters);
+        assert_eq!(parameters.low_length, 3.0);
+        let at = |length| Observed { length, ..Observed::default() };
+        assert!(own.is_due(&at(0.9)) && !own.is_due(&at(1.1)));
+        let radius = 0.7_f64;
+        let (length, area) = (4.0 * 2_f64.sqrt() * radius, 2.0 * radius * radius);
+        let left = own.left(&Observables { length, area, ..start }).unwrap();
+        assert!((left - 1.4).abs() < 1e-12, "{left}");
+        assert!(of(None, &start).is_none() && of(Some("0.5"), &Observables { turning: 0, ..start }).is_none());
+    }
+}

@@ -1,0 +1,109 @@
+//! Driving forces from outside, against circles, whose radius is known: R(t) = R(0) - F t under surface diffusion.
+
+use std::f64::consts::PI;
+
+use crate::common::program::{Row, column, number, run};
+
+/// One unperturbed curve with these flags.
+fn one(flags: &str) -> Row {
+    run(&format!("{flags} --amplitude 0 --curves 1 --adaptive=1e-4 --pull auto")).summary().remove(0)
+}
+
+#[test]
+fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
+    for (flags, radius, force) in [
+        ("--shape circle:1 --drive 0.5", 1.0, 0.5),
+        ("--shape circle:1 --drive 0.5 --form geometric", 1.0, 0.5),
+        ("--shape circle:1 --drive 0.5 --precision f32 --points 64", 1.0, 0.5),
+        // The force is a velocity, whatever the mobility, and units of length change no digit.
+        ("--shape circle:1 --drive 0.5 --mobility 10", 1.0, 0.5),
+        ("--shape circle:3e-6 --drive 2e-4 --mobility 1e-20", 3e-6, 2e-4),
+        ("--shape circle:1 --drive 2 --energy cos:4,0", 1.0, 2.0),
+    ] {
+        let row = one(&format!("{flags} --t-end auto"));
+        let (t, end) = (number(&row, "t_vanish"), number(&row, "t_end"));
+        assert_eq!(row["status"], "vanished", "{flags}");
+        assert!((t * force / radius - 1.0).abs() < 2e-4, "{flags}: {t}");
+        // It was followed to a quarter of its length, and not much beyond.
+        let left = number(&row, "length_end") / number(&row, "length_start");
+        assert!(end < t && (0.1..=0.25).contains(&left), "{flags}: {end} {left}");
+    }
+}
+
+#[test]
+fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_none_vanishes_without_a_force() {
+    let row = one("--shape circle:1 --drive 0.5 --t-end 1.7 --relax-at 1e-12");
+    assert_eq!((&*row["status"], &*row["t_vanish"], number(&row, "t_end")), ("relaxed", "", 1.7));
+    let row = one("--shape flower:3:0.1 --drive 0.5 --t-end 0.01");
+    assert_eq!((&*row["status"], &*row["t_vanish"]), ("unfinished", ""));
+    let row = one("--shape circle:1 --drive -0.5 --t-end 0.5");
+    let grown = number(&row, "length_end") / number(&row, "length_start");
+    assert!((grown - 1.25).abs() < 1e-3 && row["t_vanish"].is_empty(), "{grown}");
+    // Curvature flow shrinks curves, too, but no force drives them.
+    let row = one("--shape ellipse:2,1 --flow poly:1 --t-end 2 --relax-to 1e-9");
+    assert!(
+        row["status"] != "vanished" && row["t_vanish"].is_empty() && number(&row, "t_end") < 2.0,
+        "{}",
+        row["status"]
+    );
+}
+
+#[test]
+fn a_feedback_brings_the_area_to_its_own() {
+    let (gain, target) = (1.0, 0.81 * PI);
+    let row = one(&format!("--shape circle:1 --drive feedback:{gain},{target} --t-end 1 --relax-at 1e-12"));
+    // (R - R₀)/(R + R₀) falls as exp(-2π c R₀ t).
+    let rest = 0.9;
+    let share = (1.0 - rest) / (1.0 + rest) * f64::exp(-2.0 * PI * gain * rest);
+    let radius = rest * (1.0 + share) / (1.0 - share);
+    let (found, exact) = (number(&row, "area_end"), PI * radius * radius);
+    assert!((found / exact - 1.0).abs() < 2e-4, "{found} {exact}");
+    assert!(row["t_vanish"].is_empty());
+}
+
+#[test]
+fn the_times_of_driven_members_have_statistics_of_their_own() {
+    let common = "--shape circle:1 --amplitude 0 --points 40 --adaptive --pull auto --t-end auto";
+    let done = run(&format!("{common} --curves 7 --drive uniform(0.4..0.8)"));
+    let (rows, forces) = (done.summary(), column(&done.rows("members.csv"), "drive_1"));
+    for (row, force) in rows.iter().zip(&forces) {
+        assert!((number(row, "t_vanish") * force - 1.0).abs() < 2e-3, "{force}");
+    }
+    let cell = &done.rows("ensemble.csv")[0];
+    let mut times = column(&rows, "t_vanish");
+    times.sort_by(f64::total_cmp);
+    assert_eq!(["vanished", "t_vanish_known", "members"].map(|name| number(cell, name)), [7.0; 3]);
+    assert_eq!(number(cell, "t_vanish_median"), times[3]);
+    assert!(number(cell, "t_vanish_median_low") < times[3] && times[3] < number(cell, "t_vanish_median_high"));
+    let swept = run(&format!("{common} --curves 1 --sweep drive=0.25,0.5,1"));
+    let medians = column(&swept.rows("ensemble.csv"), "t_vanish_median");
+    for (median, force) in medians.iter().zip([0.25, 0.5, 1.0]) {
+        assert!((median * force - 1.0).abs() < 2e-3, "{median}");
+    }
+}
+
+#[test]
+fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
+    let done = run(
+        "--shape ellipse:2,1 --drive 0.5 --amplitude 0 --curves 1 --adaptive=1e-4 --pull auto --t-end auto --event small=length<=0.3*start",
+    );
+    let row = &done.summary()[0];
+    let (t, circle) = (number(row, "t_vanish"), f64::sqrt(2.0) / 0.5);
+    assert!(t < circle && t > 0.9 * circle, "{t} {circle}");
+    // It relaxed on its way.
+    assert!((0.5..2.0).contains(&number(row, "t_relax")));
+    let small = number(&done.rows("events.csv")[0], "t");
+    assert!(small < number(row, "t_end") && small > 0.6 * t, "{small}");
+    // The area falls at the rate F L, and theory has no rate.
+    assert_eq!(done.rows("rates.csv")[0]["rate_theory"], "");
+}
+
+#[test]
+fn members_that_vanish_before_they_relax_are_censored_then() {
+    let done = run("--shape ellipse:2,1 --drive 6 --curves 8 --adaptive --pull auto --t-end auto --points 64");
+    let rows = done.summary();
+    let early = |row: &&Row| row["t_relax"].is_empty();
+    assert!(rows.iter().any(|row| row["status"] == "vanished"));
+    let cell = &done.rows("ensemble.csv")[0];
+    assert_eq!(number(cell, "t_relax_known"), (rows.len() - rows.iter().filter(early).count()) as f64);
+}
