@@ -13,7 +13,6 @@ fn one(flags: &str) -> Row {
 fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
     for (flags, radius, force) in [
         ("--shape circle:1 --drive 0.5", 1.0, 0.5),
-        ("--shape circle:1 --drive 0.5 --form geometric", 1.0, 0.5),
         ("--shape circle:1 --drive 0.5 --precision f32 --points 64", 1.0, 0.5),
         // The force is a velocity, whatever the mobility, and units of length change no digit.
         ("--shape circle:1 --drive 0.5 --mobility 10", 1.0, 0.5),

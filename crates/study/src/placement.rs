@@ -464,7 +464,8 @@ fn open_gpu<T: Vectorised>(
 ) -> Result<Box<dyn Backend>> {
     let members = usize::try_from(spec.member_count()).unwrap_or(usize::MAX);
     let adaptive = spec.adaptive.is_some();
-    let watched = !spec.event.is_empty();
+    // Those that may vanish pause, too.
+    let watched = !spec.event.is_empty() || spec.drive.is_some();
     let driven = Driven::of(spec);
     let variant = Variant { adaptive, watched, ..driven.variant(gpu.capacity().variant(blocks, spec.solver())) };
     // The self-test has its own cap: with the run's, a solve may end before it converges, and then roundings decide.

@@ -257,7 +257,7 @@ keys! {
         /// polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
         pull: Pull = Pull::Rate(0.0), "KAPPA", Method;
         /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force of the
-        /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper; of crystals geometric]
+        /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
         #[serde(skip_serializing_if = "Option::is_none")]
         form: Option<PositionForm> = None, "FORM", Method;
         /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]

@@ -230,10 +230,15 @@ impl Spec {
     }
 
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
-    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals, and where
-    /// something is kept, there is no other.
+    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals and forced
+    /// curves there is no other.
     pub fn is_geometric(&self) -> bool {
-        self.form == Some(PositionForm::Geometric) || self.has_crystals() || self.conserve.is_some()
+        self.form == Some(PositionForm::Geometric) || self.has_crystals() || self.is_forced()
+    }
+
+    /// Whether a force acts beside the flow, or something is kept.
+    pub fn is_forced(&self) -> bool {
+        self.drive.is_some() || self.conserve.is_some()
     }
 
     /// Whether energy or mobility depend on the direction.

@@ -34,7 +34,7 @@ const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 /// Keys that are chosen for an uncertainty.
 const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
 /// Keys with which the force of the polygon moves the nodes.
-const GEOMETRIC: [&str; 3] = ["energy", "diffusivity", "conserve"];
+const GEOMETRIC: [&str; 4] = ["energy", "diffusivity", "drive", "conserve"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
 const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
 /// The rows of a resident member stay in memory until it ends.
@@ -93,7 +93,7 @@ impl Spec {
         if self.relax_at.is_none() {
             self.relax_to.get_or_insert(DEFAULT_RELAX_TO);
         }
-        if self.has_crystals() || self.conserve.is_some() {
+        if self.has_crystals() || self.is_forced() {
             self.form = Some(PositionForm::Geometric);
         } else if self.form == Some(PositionForm::Paper) && !GEOMETRIC.into_iter().any(|key| self.sweep.has(key)) {
             self.form = None;
@@ -367,6 +367,10 @@ impl Spec {
         if let Some(conserved) = self.conserve {
             let problem = format!("a flow is driven or keeps something, and --conserve {conserved} is given");
             return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
+        }
+        if self.form == Some(PositionForm::Paper) {
+            let problem = format!("its steps do not see errors of the nodes, and --drive {drive} is given");
+            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
         }
         if self.refine {
             let problem =

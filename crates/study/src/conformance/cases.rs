@@ -51,10 +51,12 @@ pub enum Driven {
 impl Driven {
     /// What drives the members of a spec.
     pub fn of(spec: &Spec) -> Driven {
-        match (spec.has_crystals(), spec.is_geometric()) {
-            (true, _) => Driven::Crystals,
-            (false, true) => Driven::Geometric,
-            (false, false) => Driven::Paper,
+        match (spec.has_crystals(), spec.is_forced(), spec.is_geometric()) {
+            (true, true, _) => Driven::ForcedCrystals,
+            (true, false, _) => Driven::Crystals,
+            (false, true, _) => Driven::Forced,
+            (false, false, true) => Driven::Geometric,
+            (false, false, false) => Driven::Paper,
         }
     }
 
@@ -123,7 +125,7 @@ fn become_forced(run: &mut Run<f64>, which: usize) {
     let kept = [1.0003 * now.area, 0.9999 * now.length];
     let forcing = match which {
         0 => Forcing { drive: Some(Drive::Constant(0.2)), ..Forcing::default() },
-        1 => Forcing { drive: Some(Drive::Feedback { gain: -0.1, area: 5.0 }), ..Forcing::default() },
+        1 => Forcing { drive: Some(Drive::Feedback { gain: -0.1, area: 5.5 }), ..Forcing::default() },
         2 => Forcing { conserved: Some(Conserved::Area), kept, ..Forcing::default() },
         3 => Forcing { conserved: Some(Conserved::Length), kept, ..Forcing::default() },
         _ => Forcing { conserved: Some(Conserved::AreaAndLength), kept, ..Forcing::default() },

@@ -87,6 +87,10 @@ const REFUSED: &[(&str, &str)] = &[
         "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",
     ),
     (
+        "drive = 0.5\nform = 'paper'",
+        "--form paper: its steps do not see errors of the nodes, and --drive 0.5 is given; use --form geometric",
+    ),
+    (
         "drive = 0.5\nrefine = true",
         "--refine true: its intervals were calibrated without a driving force, and --drive 0.5",
     ),
@@ -199,7 +203,7 @@ const ACCEPTED: &[&str] = &[
     "energy = 'cos:4,0.03'\nform = 'auto'",
     "energy = 'cos:2,0.1,30+cos:4,0.01'\ndiffusivity = 'cos:4,0.5'\nform = 'geometric'",
     "energy = 'cos:4,uniform(0.01..0.03)'",
-    "drive = 0.5\nform = 'paper'",
+    "drive = 0.5\nform = 'geometric'",
     "drive = -0.5\nenergy = 'cos:3,0.05'",
     "drive = 'feedback:uniform(1..2),3'\nflow = 'willmore'",
     "conserve = 'area'\nflow = 'elastic:0.5'\nconserve-at = [3]\nform = 'geometric'",
