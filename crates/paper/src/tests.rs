@@ -21,8 +21,8 @@ fn number(bytes: &[u8], at: usize) -> u32 {
 
 /// The rows of a PNG file, of 3 bytes for each pixel.
 fn pixels(png: &[u8]) -> Vec<u8> {
-    let mut reader = png::Decoder::new(png).read_info().unwrap();
-    let mut pixels = vec![0; reader.output_buffer_size()];
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
     pixels
 }
