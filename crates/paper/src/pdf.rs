@@ -42,7 +42,11 @@ const STEM: f32 = 88.0;
 /// The file of a picture whose pixels have `scale` points.
 pub(super) fn file(tree: &Tree, scale: f32, title: &str) -> Result<Vec<u8>, String> {
     let face = Face::parse(FONT, 0).map_err(|e| format!("its font: {e}"))?;
-    let mut page = Drawn { content: Content::new(), opacities: Vec::new(), letters: Letters { face, numbers: GlyphRemapper::new(), texts: BTreeMap::new() } };
+    let mut page = Drawn {
+        content: Content::new(),
+        opacities: Vec::new(),
+        letters: Letters { face, numbers: GlyphRemapper::new(), texts: BTreeMap::new() },
+    };
     let [width, height] = [tree.size().width(), tree.size().height()].map(|side| side * scale);
     // SVG counts downwards, PDF upwards.
     page.content.transform([scale, 0.0, 0.0, -scale, 0.0, height]);
@@ -307,9 +311,7 @@ impl Letters<'_> {
             .cap_height(self.scaled(self.face.capital_height().unwrap_or(self.face.ascender())))
             .stem_v(STEM)
             .font_file2(FONT_FILE);
-        pdf.stream(FONT_FILE, &deflated(&part))
-            .filter(Filter::FlateDecode)
-            .pair(Name(b"Length1"), part.len() as i32);
+        pdf.stream(FONT_FILE, &deflated(&part)).filter(Filter::FlateDecode).pair(Name(b"Length1"), part.len() as i32);
         let mut texts = UnicodeCmap::new(Name(b"Custom"), SYSTEM);
         for (number, text) in &self.texts {
             texts.pair_with_multiple(*number, text.chars());

@@ -94,6 +94,42 @@ fn a_pdf_has_the_size_of_the_width_and_the_letters_of_its_text() {
 }
 
 #[test]
+fn a_png_has_fills_strokes_dots_and_turned_text_where_they_are() {
+    let style = ".a { fill: #00ff00; stroke: #ff0000; stroke-width: 4 } text { font-size: 12px; fill: #0000ff }
+        .b { fill: none; stroke: #0000ff; stroke-width: 9; stroke-linecap: round; stroke-opacity: 0.6 }";
+    let mut svg = Svg::new(100.0, 100.0, style, "a");
+    svg.rectangle("a", [20.0, 20.0].into(), [30.0, 30.0].into(), 0.0);
+    svg.path("b", "M80 30h0");
+    svg.text_upwards("", [90.0, 95.0].into(), "xxxxxx");
+    let print = Printer::default().read("Words", &svg.finish(), "100".parse().unwrap()).unwrap();
+    let png = print.file(PaperFormat::png(254).unwrap()).unwrap();
+    let pixels = pixels(&png);
+    assert_eq!([number(&png, 16), number(&png, 20)], [1000, 1000]);
+    let at = |x: usize, y: usize| <[u8; 3]>::try_from(&pixels[3 * (10_000 * y + 10 * x)..][..3]).unwrap();
+    let [white, red, green, dot] = [[255; 3], [255, 0, 0], [0, 255, 0], [102, 102, 255]];
+    for (x, y, colour) in [
+        (35, 35, green),
+        (35, 21, red),
+        (35, 19, red),
+        (21, 35, red),
+        (35, 17, white),
+        (53, 35, white),
+        (80, 30, dot),
+        (83, 31, dot),
+        (86, 30, white),
+    ] {
+        assert_eq!(at(x, y), colour, "{x} {y}");
+    }
+    let blue = |from: [usize; 2], to: [usize; 2]| {
+        let rows =
+            (10 * from[1]..10 * to[1]).map(|y| &pixels[3 * (1000 * y + 10 * from[0])..3 * (1000 * y + 10 * to[0])]);
+        rows.flat_map(|row| row.chunks(3)).filter(|pixel| **pixel == [0, 0, 255]).count()
+    };
+    // Upwards from its place, and nowhere else.
+    assert!(blue([81, 50], [92, 95]) > 2000 && blue([0, 50], [81, 100]) == 0, "the text is elsewhere");
+}
+
+#[test]
 fn a_pdf_has_every_dot_dash_colour_and_opacity() {
     let style = ".a { fill: none; stroke: #ff0000; stroke-width: 5; stroke-linecap: round; stroke-opacity: 0.5 }
         .b { fill: none; stroke: #808080; stroke-linejoin: round; stroke-dasharray: 6 4 }
@@ -128,7 +164,8 @@ fn a_pdf_has_every_dot_dash_colour_and_opacity() {
 
 #[test]
 fn lines_of_text_are_whole_and_turned_as_in_the_picture() {
-    let mut svg = Svg::new(200.0, 100.0, "text { font-family: sans-serif; font-size: 12px } .wide { letter-spacing: 3px }", "a");
+    let mut svg =
+        Svg::new(200.0, 100.0, "text { font-family: sans-serif; font-size: 12px } .wide { letter-spacing: 3px }", "a");
     svg.text("wide", [20.0, 40.0].into(), "AVA τ");
     svg.text_upwards("", [10.0, 90.0].into(), "AVA");
     let print = Printer::default().read("Words", &svg.finish(), "page".parse().unwrap()).unwrap();
