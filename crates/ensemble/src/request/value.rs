@@ -66,14 +66,6 @@ pub trait Value: Sized {
     }
 }
 
-/// The names of a type that is one of several words.
-pub const fn names<T: Value>() -> &'static [&'static str] {
-    match T::TAKES {
-        Takes::Word { names, .. } => names,
-        _ => &[],
-    }
-}
-
 /// Parses a number.
 ///
 /// # Errors
@@ -192,6 +184,13 @@ impl Value for Sweep {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn names<T: Value>() -> &'static [&'static str] {
+        match T::TAKES {
+            Takes::Word { names, .. } => names,
+            _ => &[],
+        }
+    }
 
     #[test]
     fn the_words_of_a_flag_are_those_of_its_type() {
