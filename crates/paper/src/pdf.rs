@@ -42,10 +42,10 @@ const STEM: f32 = 88.0;
 /// The file of a picture whose pixels have `scale` points.
 pub(super) fn file(tree: &Tree, scale: f32, title: &str) -> Result<Vec<u8>, String> {
     let face = Face::parse(FONT, 0).map_err(|e| format!("its font: {e}"))?;
-    let mut page = Drawn {
+    let mut page = PdfPage {
         content: Content::new(),
         opacities: Vec::new(),
-        letters: Letters { face, numbers: GlyphRemapper::new(), texts: BTreeMap::new() },
+        letters: PdfLetters { face, numbers: GlyphRemapper::new(), texts: BTreeMap::new() },
     };
     let [width, height] = [tree.size().width(), tree.size().height()].map(|side| side * scale);
     // SVG counts downwards, PDF upwards.
@@ -96,13 +96,13 @@ fn matrix(of: Transform) -> [f32; 6] {
 }
 
 /// What is drawn on a page.
-struct Drawn<'a> {
+struct PdfPage<'a> {
     content: Content,
     opacities: Vec<f32>,
-    letters: Letters<'a>,
+    letters: PdfLetters<'a>,
 }
 
-impl Drawn<'_> {
+impl PdfPage<'_> {
     fn group(&mut self, group: &Group) {
         let moved = !group.transform().is_identity();
         if moved {
@@ -262,14 +262,14 @@ fn gray_or_rgb(colour: Color) -> (Option<f32>, [f32; 3]) {
 }
 
 /// The letters in use, numbered anew.
-struct Letters<'a> {
+struct PdfLetters<'a> {
     face: Face<'a>,
     numbers: GlyphRemapper,
     /// Text of each by its number.
     texts: BTreeMap<u16, String>,
 }
 
-impl Letters<'_> {
+impl PdfLetters<'_> {
     /// The number of a glyph that stands for this text.
     fn of_glyph(&mut self, glyph: u16, text: &str) -> u16 {
         let number = self.numbers.remap(glyph);
