@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_slip_in_a_short_value_is_recognised() {
-        for (slip, near) in [("pgn", Some("png")), ("pngg", Some("png")), ("svg,pfd", Some("pdf")), ("jpeg", None)] {
+        for (slip, near) in [("pgn", Some("png")), ("pngg", Some("png")), ("svg,pfd", Some("pdf")), ("tiff", None)] {
             let error = said(&["plot", "out", "--format", slip]);
             let tip = near.map(|near| format!("a similar value exists: '{near}'"));
             assert!(error.contains("possible values: svg, png, pdf") && error.contains("invalid value"), "{error}");
