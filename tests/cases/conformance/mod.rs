@@ -11,18 +11,16 @@ use std::{
     sync::atomic::{AtomicU64, Ordering},
 };
 
-use crate::{common::command, everything, may_lack_gpu};
+use crate::{everything, may_lack_gpu};
 use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
-        ConformanceRow, Driven, Tamper, adaptive_members,
-        compare::{Left, MAX_SWEEPS, MEMBERS, adaptive, events, on_gpu, on_gpu_by, runs, stages},
-        crystals, members, self_test, stages_of,
+        ConformanceRow, Tamper, adaptive_members,
+        compare::{Left, adaptive, events, on_gpu, on_gpu_by, runs, stages},
+        members,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
-    flow::{DIFFUSIVITY_WAVES, ENERGY_WAVES},
-    placement::MAX_POINTS_F32,
     scheme::{
         State,
         evolve::{Team, evolve},

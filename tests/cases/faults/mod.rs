@@ -26,12 +26,7 @@ use curvelax::{
         request::spec::{BackendChoice, Precision},
     },
     placement,
-    scheme::{
-        Parameters, State,
-        member::{Counters, Report},
-        run::Run,
-        step::Method,
-    },
+    scheme::{State, member::Counters, run::Run, step::Method},
     simulate::simulate,
     solver::{Blocks, Solver},
 };
