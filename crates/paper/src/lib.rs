@@ -124,7 +124,7 @@ impl Print {
         pixmap.fill(tiny_skia::Color::WHITE);
         pixels::draw(self.tree.root(), Transform::from_scale(scale as f32, scale as f32), &mut pixmap.as_mut());
         // Nothing shines through white paper.
-        let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
+        let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         encoded([width, height], dpi, &rgb).map_err(|e| Error::Failed(format!("{}: no PNG ({e})", self.title)))
     }
 
