@@ -100,13 +100,14 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     code
 }
 
-/// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags.
+/// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags and [suggests](unknown::suggest) values.
 fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli, clap::Error> {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let program = Cli::command();
     let parsed = program.clone().try_get_matches_from(&arguments).and_then(|matches| Cli::from_arg_matches(&matches));
     parsed.map_err(|mut error| {
         unknown::explain(&mut error, &program, &arguments);
+        unknown::suggest(&mut error);
         unknown::shorten(&mut error);
         error
     })

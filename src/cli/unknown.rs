@@ -1,4 +1,4 @@
-//! Flags that a command does not have: suggestions of what was meant.
+//! Flags that a command does not have, and values that a flag does not have: suggestions of what was meant.
 
 use std::{ffi::OsString, iter};
 
@@ -37,6 +37,17 @@ pub fn explain(error: &mut clap::Error, program: &Command, arguments: &[OsString
         error.remove(ContextKind::Suggested);
         error.remove(ContextKind::SuggestedArg);
         error.insert(ContextKind::SuggestedArg, ContextValue::String(format!("--{near}")));
+    }
+}
+
+/// If `error` is about a value that is none of several, adds the nearest of these where clap finds none: it misses two
+/// letters swapped in a short one.
+pub fn suggest(error: &mut clap::Error) {
+    let Some(ContextValue::String(given)) = error.get(ContextKind::InvalidValue) else { return };
+    let Some(ContextValue::Strings(valid)) = error.get(ContextKind::ValidValue) else { return };
+    let near = nearest(given, valid.iter().map(String::as_str)).map(str::to_owned);
+    if let (Some(near), None) = (near, error.get(ContextKind::SuggestedValue)) {
+        error.insert(ContextKind::SuggestedValue, ContextValue::String(near));
     }
 }
 
@@ -110,6 +121,17 @@ mod tests {
         let error = said(&["run", "--tua", "1"]);
         assert!(error.contains("a similar argument exists: '--tau'"), "{error}");
         assert!(!error.contains("-- --tua"), "{error}");
+    }
+
+    #[test]
+    fn a_slip_in_a_short_value_is_recognised() {
+        for (slip, near) in [("pgn", Some("png")), ("pngg", Some("png")), ("svg,pfd", Some("pdf")), ("tiff", None)] {
+            let error = said(&["plot", "out", "--format", slip]);
+            let tip = near.map(|near| format!("a similar value exists: '{near}'"));
+            assert!(error.contains("possible values: svg, png, pdf") && error.contains("invalid value"), "{error}");
+            assert_eq!(error.contains("similar"), tip.is_some(), "{slip}: {error}");
+            assert!(tip.is_none_or(|tip| error.contains(&tip)), "{slip}: {error}");
+        }
     }
 
     #[test]

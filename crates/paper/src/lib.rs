@@ -1,8 +1,10 @@
 //! Pictures for papers: the SVG of this program as PNG and PDF, at the width of a journal's column.
 //!
-//! usvg reads a picture, resvg makes pixels of it and krilla a PDF. All text is in a font that is compiled in, so that the
-//! same picture is the same on every machine.
+//! usvg reads a picture, tiny-skia makes pixels of its paths, and pdf-writer a PDF. All text is in a font that is compiled in,
+//! so that the same picture is the same on every machine.
 
+mod pdf;
+mod pixels;
 mod width;
 
 use std::{collections::BTreeSet, sync::Arc};
@@ -11,12 +13,8 @@ use curvelax_base::{
     error::{Error, Result},
     text::count,
 };
-use krilla::{Document, geom::Size, metadata::Metadata, page::PageSettings};
-use krilla_svg::{SurfaceExt, SvgSettings};
-use resvg::{
-    tiny_skia::{Color, Pixmap, Transform},
-    usvg::{Group, Node, Options, Tree, fontdb::Database},
-};
+use tiny_skia::Pixmap;
+use usvg::{Color, Group, Node, Options, Paint, Transform, Tree, fontdb::Database};
 
 pub use width::{MM, PaperWidth};
 
@@ -75,11 +73,14 @@ impl Printer {
     /// Reads the text of an SVG file that is to be `width` wide, with a title for readers of a PDF.
     ///
     /// # Errors
-    /// [`Error::Failed`] for text that is not SVG.
+    /// [`Error::Failed`] for text that is not SVG, and for what pictures of this program do not have.
     pub fn read(&self, title: &str, svg: &str, width: PaperWidth) -> Result<Print> {
-        let tree =
-            Tree::from_str(svg, &self.0).map_err(|e| Error::Failed(format!("{title}: not an SVG file ({e})")))?;
-        Ok(Print { title: title.into(), tree, width })
+        let failed = |problem: String| Error::Failed(format!("{title}: {problem}"));
+        let tree = Tree::from_str(svg, &self.0).map_err(|e| failed(format!("not an SVG file ({e})")))?;
+        match unknown_in(tree.root()) {
+            Some(unknown) => Err(failed(format!("has {unknown}, which no picture of this program has"))),
+            None => Ok(Print { title: title.into(), tree, width }),
+        }
     }
 }
 
@@ -120,26 +121,17 @@ impl Print {
             let problem = format!("{} would have {width} × {height} pixels, 10⁸ are the most", self.title);
             return Err(Error::value("dpi", dpi, &problem, "use fewer dots per inch, a smaller width, or pdf"));
         };
-        pixmap.fill(Color::WHITE);
-        resvg::render(&self.tree, Transform::from_scale(scale as f32, scale as f32), &mut pixmap.as_mut());
+        pixmap.fill(tiny_skia::Color::WHITE);
+        pixels::draw(self.tree.root(), Transform::from_scale(scale as f32, scale as f32), &mut pixmap.as_mut());
         // Nothing shines through white paper.
-        let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
+        let rgb: Vec<u8> = pixmap.data().chunks_exact(4).flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
         encoded([width, height], dpi, &rgb).map_err(|e| Error::Failed(format!("{}: no PNG ({e})", self.title)))
     }
 
     fn pdf(&self) -> Result<Vec<u8>> {
-        let failed = |problem: &str| Error::Failed(format!("{}: no PDF ({problem})", self.title));
-        let (width, height) = (self.tree.size().width(), self.tree.size().height());
-        let scale = (self.width.mm() / MM_PER_INCH * POINTS_PER_INCH) as f32 / width;
-        let size = Size::from_wh(scale * width, scale * height).ok_or_else(|| failed("it has no size"))?;
-        let mut document = Document::new();
-        document.set_metadata(Metadata::new().title(self.title.clone()).creator("curvelax".into()));
-        let mut page = document.start_page_with(PageSettings::new(size));
-        let mut surface = page.surface();
-        surface.draw_svg(&self.tree, size, SvgSettings::default()).ok_or_else(|| failed("it cannot be drawn"))?;
-        surface.finish();
-        page.finish();
-        document.finish().map_err(|e| failed(&format!("{e:?}")))
+        let scale = (self.width.mm() / MM_PER_INCH * POINTS_PER_INCH) as f32 / self.tree.size().width();
+        pdf::file(&self.tree, scale, &self.title)
+            .map_err(|problem| Error::Failed(format!("{}: no PDF ({problem})", self.title)))
     }
 }
 
@@ -156,6 +148,42 @@ fn encoded([width, height]: [u32; 2], dpi: u32, rgb: &[u8]) -> Result<Vec<u8>, p
     writer.write_image_data(rgb)?;
     writer.finish()?;
     Ok(file)
+}
+
+/// What neither format draws, in a group.
+fn unknown_in(group: &Group) -> Option<&'static str> {
+    let plain = |paint: &Paint| matches!(paint, Paint::Color(_));
+    if group.opacity() != usvg::Opacity::ONE || group.blend_mode() != usvg::BlendMode::Normal {
+        return Some("a group with an opacity");
+    }
+    if group.clip_path().is_some() || group.mask().is_some() || !group.filters().is_empty() {
+        return Some("a group that is clipped, masked or filtered");
+    }
+    group.children().iter().find_map(|node| match node {
+        Node::Group(group) => unknown_in(group),
+        Node::Path(path) => {
+            let paints = [path.fill().map(|fill| fill.paint()), path.stroke().map(|stroke| stroke.paint())];
+            (!paints.into_iter().flatten().all(plain)).then_some("a paint that is no colour")
+        }
+        Node::Text(text) => text.layouted().iter().find_map(|span| match span {
+            span if span.stroke.is_some() => Some("text with outlines"),
+            span if span.underline.is_some() || span.overline.is_some() || span.line_through.is_some() => {
+                Some("text with lines")
+            }
+            span if !span.fill.iter().all(|fill| plain(fill.paint())) => Some("a paint that is no colour"),
+            _ => None,
+        }),
+        Node::Image(_) => Some("an image"),
+    })
+}
+
+/// Of a picture that was read.
+fn colour(paint: &Paint) -> Color {
+    match paint {
+        Paint::Color(colour) => *colour,
+        // `unknown_in` refuses it.
+        _ => Color::black(),
+    }
 }
 
 /// Adds the letters of a group that the font lacks.

@@ -19,10 +19,23 @@ fn number(bytes: &[u8], at: usize) -> u32 {
     u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap())
 }
 
+/// What the compressed streams of a PDF hold: the first is the page.
+fn streams(pdf: &[u8]) -> Vec<String> {
+    let mut streams = Vec::new();
+    let mut rest = pdf;
+    while let Some(at) = rest.windows(8).position(|word| word == b"\nstream\n") {
+        rest = &rest[at + 8..];
+        let mut text = Vec::new();
+        std::io::Read::read_to_end(&mut flate2::read::ZlibDecoder::new(rest), &mut text).unwrap();
+        streams.push(String::from_utf8_lossy(&text).into_owned());
+    }
+    streams
+}
+
 /// The rows of a PNG file, of 3 bytes for each pixel.
 fn pixels(png: &[u8]) -> Vec<u8> {
-    let mut reader = png::Decoder::new(png).read_info().unwrap();
-    let mut pixels = vec![0; reader.output_buffer_size()];
+    let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
     reader.next_frame(&mut pixels).unwrap();
     pixels
 }
@@ -78,6 +91,115 @@ fn a_pdf_has_the_size_of_the_width_and_the_letters_of_its_text() {
     assert!(text.contains("DejaVuSans") && text.contains("/ToUnicode"), "text is not text: {text}");
     let none = written("", PaperWidth::default()).file(PaperFormat::Pdf).unwrap();
     assert!(!String::from_utf8_lossy(&none).contains("/ToUnicode"), "the control");
+}
+
+#[test]
+fn a_png_has_fills_strokes_dots_and_turned_text_where_they_are() {
+    let style = ".a { fill: #00ff00; stroke: #ff0000; stroke-width: 4 } text { font-size: 12px; fill: #0000ff }
+        .b { fill: none; stroke: #0000ff; stroke-width: 9; stroke-linecap: round; stroke-opacity: 0.6 }";
+    let mut svg = Svg::new(100.0, 100.0, style, "a");
+    svg.rectangle("a", [20.0, 20.0].into(), [30.0, 30.0].into(), 0.0);
+    svg.path("b", "M80 30h0");
+    svg.text_upwards("", [90.0, 95.0].into(), "xxxxxx");
+    let print = Printer::default().read("Words", &svg.finish(), "100".parse().unwrap()).unwrap();
+    let png = print.file(PaperFormat::png(254).unwrap()).unwrap();
+    let pixels = pixels(&png);
+    assert_eq!([number(&png, 16), number(&png, 20)], [1000, 1000]);
+    let at = |x: usize, y: usize| <[u8; 3]>::try_from(&pixels[3 * (10_000 * y + 10 * x)..][..3]).unwrap();
+    let [white, red, green, dot] = [[255; 3], [255, 0, 0], [0, 255, 0], [102, 102, 255]];
+    for (x, y, colour) in [
+        (35, 35, green),
+        (35, 21, red),
+        (35, 19, red),
+        (21, 35, red),
+        (35, 17, white),
+        (53, 35, white),
+        (80, 30, dot),
+        (83, 31, dot),
+        (86, 30, white),
+    ] {
+        assert_eq!(at(x, y), colour, "{x} {y}");
+    }
+    let blue = |from: [usize; 2], to: [usize; 2]| {
+        let rows =
+            (10 * from[1]..10 * to[1]).map(|y| &pixels[3 * (1000 * y + 10 * from[0])..3 * (1000 * y + 10 * to[0])]);
+        rows.flat_map(|row| row.chunks(3)).filter(|pixel| **pixel == [0, 0, 255]).count()
+    };
+    // Upwards from its place, and nowhere else.
+    assert!(blue([81, 50], [92, 95]) > 2000 && blue([0, 50], [81, 100]) == 0, "the text is elsewhere");
+}
+
+#[test]
+fn a_pdf_has_every_dot_dash_colour_and_opacity() {
+    let style = ".a { fill: none; stroke: #ff0000; stroke-width: 5; stroke-linecap: round; stroke-opacity: 0.5 }
+        .b { fill: none; stroke: #808080; stroke-linejoin: round; stroke-dasharray: 6 4 }
+        .c { fill: #0000ff; stroke: #000000; fill-rule: evenodd } .d { fill: #000000 }";
+    let mut svg = Svg::new(200.0, 100.0, style, "a");
+    svg.path("a", "M10 20h0M30 20h0");
+    svg.path("b", "M1 2L3 4Q5 6 7 8");
+    svg.path("c", "M11 12L13 14L15 12Z");
+    svg.rectangle("d", [50.0, 60.0].into(), [7.0, 9.0].into(), 0.0);
+    let print = Printer::default().read("Words", &svg.finish(), "100".parse().unwrap()).unwrap();
+    let pdf = print.file(PaperFormat::Pdf).unwrap();
+    let page = &streams(&pdf)[0];
+    // Upside down, and of 100 mm.
+    assert!(page.starts_with("1.41732") && page.contains("-1.41732") && page.contains(" 141.732"), "{page}");
+    for said in [
+        "1 0 0 RG\n5 w\n1 J",
+        "10 20 m\n10 20 l\n30 20 m\n30 20 l\nS",
+        " G\n1 w\n0 J\n1 j",
+        "[6 4] 0 d\n",
+        "1 2 m\n3 4 l\n4.333",
+        " 7 8 c\nS",
+        "0 0 1 rg\n11 12 m\n13 14 l\n15 12 l\nh\nf*",
+        "0 G\n1 w",
+        "50 60 m\n57 60 l\n57 69 l\n50 69 l\nh\nf",
+    ] {
+        assert!(page.contains(said), "{said:?} is not in {page}");
+    }
+    assert_eq!(page.matches("/O0 gs").count(), 1, "{page}");
+    let text = String::from_utf8_lossy(&pdf);
+    assert!(text.contains("/CA 0.5") && text.contains("/ca 0.5"), "{text}");
+}
+
+#[test]
+fn lines_of_text_are_whole_and_turned_as_in_the_picture() {
+    let mut svg =
+        Svg::new(200.0, 100.0, "text { font-family: sans-serif; font-size: 12px } .wide { letter-spacing: 3px }", "a");
+    svg.text("wide", [20.0, 40.0].into(), "AVA τ");
+    svg.text_upwards("", [10.0, 90.0].into(), "AVA");
+    let print = Printer::default().read("Words", &svg.finish(), "page".parse().unwrap()).unwrap();
+    let streams = streams(&print.file(PaperFormat::Pdf).unwrap());
+    let page = &streams[0];
+    assert_eq!((page.matches("TJ").count(), page.matches("/F 12 Tf").count()), (2, 2), "{page}");
+    assert!(page.contains("1 0 0 -1 20 40 Tm") && page.contains(" -1 1 ") && page.contains(" -80 100 cm"), "{page}");
+    // 3 of 12 pixels, to the left.
+    assert_eq!(page.matches(" -250 ").count(), 4, "{page}");
+    assert!(page.contains(r"[(\000\001\000\002\000\001)] TJ"), "{page}");
+    let texts = streams.iter().find(|text| text.contains("beginbfchar")).unwrap();
+    for letter in ["<0001> <0041>", "<0002> <0056>", "<0004> <03C4>"] {
+        assert!(texts.contains(letter), "{texts}");
+    }
+}
+
+#[test]
+fn what_no_picture_of_this_program_has_is_refused() {
+    let clip = "<clipPath id='c'><rect width='5' height='5'/></clipPath>";
+    let gradient = "<linearGradient id='g'><stop offset='0'/><stop offset='1' stop-color='red'/></linearGradient>";
+    for (content, unknown) in [
+        ("<g opacity='0.5'><rect width='9' height='9'/></g>".to_string(), "a group with an opacity"),
+        (format!("{clip}<rect clip-path='url(#c)' width='9' height='9'/>"), "a group that is clipped"),
+        (format!("{gradient}<rect fill='url(#g)' width='9' height='9'/>"), "a paint that is no colour"),
+        (format!("{gradient}<text y='9' fill='url(#g)'>a</text>"), "a paint that is no colour"),
+        ("<text y='9' stroke='red'>a</text>".into(), "text with outlines"),
+        ("<text y='9' text-decoration='underline'>a</text>".into(), "text with lines"),
+        ("<rect fill='red' width='9' height='9'/><text y='9'>a</text>".into(), ""),
+    ] {
+        let svg = format!("<svg xmlns='http://www.w3.org/2000/svg' width='20' height='20'>{content}</svg>");
+        let error = Printer::default().read("Words", &svg, PaperWidth::default()).err().map(|e| e.to_string());
+        assert_eq!(error.is_some(), !unknown.is_empty(), "{content}: {error:?}");
+        assert!(error.is_none_or(|error| error.contains(unknown)), "{content}: {unknown}");
+    }
 }
 
 #[test]

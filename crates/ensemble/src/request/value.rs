@@ -67,14 +67,6 @@ pub trait Value: Sized {
     }
 }
 
-/// The names of a type that is one of several words.
-pub const fn names<T: Value>() -> &'static [&'static str] {
-    match T::TAKES {
-        Takes::Word { names, .. } => names,
-        _ => &[],
-    }
-}
-
 /// Parses a number.
 ///
 /// # Errors
@@ -194,6 +186,13 @@ impl Value for Sweep {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn names<T: Value>() -> &'static [&'static str] {
+        match T::TAKES {
+            Takes::Word { names, .. } => names,
+            _ => &[],
+        }
+    }
 
     #[test]
     fn the_words_of_a_flag_are_those_of_its_type() {

@@ -4,6 +4,9 @@
 //!
 //! Without an adapter and with `ALLOW_NO_GPU=1`, cases that need one are reported as ignored.
 
+mod failing;
+mod liar;
+
 use std::{
     process::Output,
     time::{Duration, Instant},
@@ -23,16 +26,13 @@ use curvelax::{
         request::spec::{BackendChoice, Precision},
     },
     placement,
-    scheme::{
-        Parameters, State,
-        member::{Counters, Report},
-        run::Run,
-        step::Method,
-    },
+    scheme::{State, member::Counters, run::Run, step::Method},
     simulate::simulate,
     solver::{Blocks, Solver},
 };
+use failing::any_call_fails;
 use glam::DVec2;
+use liar::the_self_test_finds_a_liar;
 use libtest_mimic::{Failed, Trial};
 
 use crate::common::command;
@@ -257,107 +257,6 @@ fn poison_on_the_gpu<T: Evolves>(kernel: Kernel<T>, gpu: &Gpu, solver: Solver, a
 
 // The self-test.
 
-/// A back end that computes correctly and reports one thing wrongly.
-struct Liar<B> {
-    inner: B,
-    lie: Lie,
-}
-
-/// A wrong report: of which number, and by how much relative to the radius.
-#[derive(Clone, Copy, Debug)]
-enum Lie {
-    None,
-    Node(f64),
-    Curvature(f64),
-    Excess(f64),
-    Steps,
-    Nothing,
-}
-
-impl<B: Backend> Backend for Liar<B> {
-    fn slots(&self) -> usize {
-        self.inner.slots()
-    }
-    fn load(&mut self, slot: usize, run: &Run<f64>) -> curvelax::Result<()> {
-        self.inner.load(slot, run)
-    }
-    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
-        self.inner.aim(slot, goal, parameters);
-    }
-    fn clear(&mut self, slot: usize) {
-        self.inner.clear(slot);
-    }
-    fn batches(&self) -> usize {
-        self.inner.batches()
-    }
-    fn start(&mut self, batch: usize) -> curvelax::Result<()> {
-        self.inner.start(batch)
-    }
-    fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
-        self.inner.finish(batch)
-    }
-    fn counters(&self, slot: usize) -> Counters {
-        let mut counters = self.inner.counters(slot);
-        if let (Lie::Steps, false) = (self.lie, counters.is_running()) {
-            counters.steps += 1;
-        }
-        counters
-    }
-    fn report(&self, slot: usize) -> Report<f64> {
-        let mut report = self.inner.report(slot);
-        if let Lie::Excess(by) = self.lie {
-            report.now.excess += by;
-        }
-        report
-    }
-    fn state(&mut self, slot: usize) -> curvelax::Result<State<f64>> {
-        let mut state = self.inner.state(slot)?;
-        let curve = &mut state.curve;
-        match self.lie {
-            Lie::Node(by) => curve.x[5] += by,
-            Lie::Curvature(by) => curve.k[2] += by,
-            // Like a device whose shaders do not run: its input, or zeros.
-            Lie::Nothing => state = State::zeros(curve.len()),
-            Lie::None | Lie::Excess(_) | Lie::Steps => {}
-        }
-        Ok(state)
-    }
-}
-
-fn the_self_test_finds_a_liar<T: Vectorised>(solver: Solver, adaptive: bool) -> Outcome {
-    let n = 64;
-    let tested = |lie: Lie| -> Result<curvelax::Result<()>, Failed> {
-        // One member at a time, as those of the self-test could not run side by side.
-        let inner = CpuBackend::<T>::with_vectors(Blocks::new(n).ok_or("n")?, method(solver), 1, Vectors::None)?;
-        let mut liar = Liar { inner, lie };
-        let result =
-            self_test::<T>(&mut liar, "toaster (bread 1.2)", false, &method(solver), n, adaptive, Driven::Paper);
-        // Its slots are free again.
-        liar.start(0)?;
-        liar.finish(0)?;
-        Ok(result)
-    };
-    tested(Lie::None)??;
-    // The smallest lie is some thousand roundings.
-    let little = 4096.0 * T::EPSILON;
-    let lies = [
-        (Lie::Node(little), ["x of member", "node 5"]),
-        (Lie::Node(f64::NAN), ["x of member", "node 5"]),
-        (Lie::Curvature(64.0 * little), ["k of member", "node 2"]),
-        (Lie::Excess(little), ["excess of member", "node 0"]),
-        (Lie::Steps, ["member 0", "steps"]),
-        (Lie::Nothing, ["x of member", "is off by"]),
-    ];
-    for (lie, named) in lies {
-        let Err(Error::Device(message)) = tested(lie)? else { return Err(format!("{lie:?} was not noticed").into()) };
-        let parts = ["GPU toaster (bread 1.2) computes wrongly", "curvelax check", "--backend cpu"];
-        for part in parts.into_iter().chain(named) {
-            require(message.contains(part), || format!("{lie:?}: {part:?} is not in: {message}"))?;
-        }
-    }
-    Ok(())
-}
-
 fn the_self_test_passes<T: Evolves>(
     kernel: &mut Kernel<T>,
     gpu: &Gpu,
@@ -549,121 +448,6 @@ fn slow_dispatch(gpu: &Gpu) -> Outcome {
         limit /= 2;
         work = more(work)?;
     }
-}
-
-// The calls of a run.
-
-/// A back end that fails at one of its calls.
-struct Failing {
-    inner: Box<dyn Backend>,
-    /// Calls of `call` that succeed first.
-    before: usize,
-    call: &'static str,
-    failed: bool,
-}
-
-impl Failing {
-    fn count(&mut self, call: &'static str) -> curvelax::Result<()> {
-        assert!(!self.failed, "{call} after the error of {}", self.call);
-        match (call == self.call, &mut self.before) {
-            (true, 0) => {
-                self.failed = true;
-                Err(Error::Device(format!("planned: {call}")))
-            }
-            (true, before) => {
-                *before -= 1;
-                Ok(())
-            }
-            (false, _) => Ok(()),
-        }
-    }
-}
-
-impl Backend for Failing {
-    fn slots(&self) -> usize {
-        self.inner.slots()
-    }
-    fn load(&mut self, slot: usize, run: &Run<f64>) -> curvelax::Result<()> {
-        self.count("load")?;
-        self.inner.load(slot, run)
-    }
-    fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>) {
-        self.inner.aim(slot, goal, parameters);
-    }
-    fn clear(&mut self, slot: usize) {
-        self.inner.clear(slot);
-    }
-    fn batches(&self) -> usize {
-        self.inner.batches()
-    }
-    fn start(&mut self, batch: usize) -> curvelax::Result<()> {
-        self.count("start")?;
-        self.inner.start(batch)
-    }
-    fn is_back(&mut self, batch: usize, most: Duration) -> bool {
-        self.inner.is_back(batch, most)
-    }
-    fn finish(&mut self, batch: usize) -> curvelax::Result<()> {
-        self.count("finish")?;
-        self.inner.finish(batch)
-    }
-    fn counters(&self, slot: usize) -> Counters {
-        self.inner.counters(slot)
-    }
-    fn report(&self, slot: usize) -> Report<f64> {
-        self.inner.report(slot)
-    }
-    fn state(&mut self, slot: usize) -> curvelax::Result<State<f64>> {
-        self.inner.state(slot)
-    }
-    fn states(&mut self, slots: &[usize]) -> curvelax::Result<Vec<State<f64>>> {
-        self.count("states")?;
-        self.inner.states(slots)
-    }
-}
-
-fn any_call_fails() -> Outcome {
-    let spec = Spec {
-        curves: 41,
-        points: 32,
-        tau: Some(1e-2.into()),
-        t_end: Some(0.2.into()),
-        relax_to: Some(0.5),
-        stop_when_relaxed: Some(true),
-        series: Some(0.05),
-        solver: Solver::Direct.into(),
-        ..Spec::default()
-    };
-    let spec = spec.validate()?;
-    let blocks = Blocks::new(spec.points).ok_or("n")?;
-    let run = |call, before| -> Result<(Vec<String>, curvelax::Result<()>), Failed> {
-        let inner = CpuBackend::<f64>::with_vectors(blocks, method(Solver::Direct), 1, Vectors::None)?;
-        let mut backend = Failing { inner: Box::new(inner), before, call, failed: false };
-        let mut all = Vec::new();
-        let cells = [Cell::only(spec.clone(), Family::new(&spec)?)];
-        let result = simulate(&cells, Precision::F64, &mut backend, 2, &mut all);
-        Ok((all.iter().map(|ended| format!("{ended:?}")).collect(), result))
-    };
-    let (whole, result) = run("none", 0)?;
-    result?;
-    require(whole.len() == 41, || format!("{} members", whole.len()))?;
-    for call in ["load", "start", "finish", "states"] {
-        let mut before = 0;
-        loop {
-            let (some, result) = run(call, before)?;
-            let place = format!("{call} fails after {before}");
-            require(some[..] == whole[..some.len()], || format!("{place}: the members before it differ"))?;
-            match result {
-                Ok(()) => break require(some.len() == 41, || format!("{place}: {} members", some.len()))?,
-                Err(Error::Device(message)) if message == format!("planned: {call}") => {}
-                Err(error) => return Err(format!("{place}: {error}").into()),
-            }
-            before += 1;
-        }
-        println!("{call} fails at each of {before} calls");
-        require(before > 3, || format!("{call}: only {before} calls"))?;
-    }
-    Ok(())
 }
 
 /// The program where the Vulkan loader finds no driver.
