@@ -2,7 +2,7 @@
 //!
 //!     cargo run --release --example kernels -- --points 100 --out kernels
 //!
-//! Writes `SOLVER[-adaptive][-geometric|-crystal][-subgroup]-PRECISION-nN` with the endings `.wgsl`, `.spv`, `.metal` and `.hlsl`. WGSL has
+//! Writes `SOLVER[-adaptive][-geometric|-crystal][-forced][-subgroup]-PRECISION-nN` with the endings `.wgsl`, `.spv`, `.metal` and `.hlsl`. WGSL has
 //! `override` constants for its sizes; the other formats have them filled in. `kernels.json` names the constants of each
 //! kernel with their values. In front of a kernel of one subgroup, WGSL by the standard wants `enable subgroups;`, which
 //! naga refuses. Metal and HLSL are written in f32 only: Metal has no f64, and naga's HLSL is tested without.
@@ -77,7 +77,8 @@ fn write<T: Real>(folder: &Path, points: usize, variant: Variant, constants: &Co
         (false, true) => "-geometric",
         (false, false) => "",
     };
-    let stem = format!("{}{adaptive}{geometric}{subgroup}-{}-n{points}", variant.solver.name(), T::NAME);
+    let forced = if variant.forced { "-forced" } else { "" };
+    let stem = format!("{}{adaptive}{geometric}{forced}{subgroup}-{}-n{points}", variant.solver.name(), T::NAME);
     let file = |ending: &str| folder.join(format!("{stem}.{ending}"));
 
     let source = shader::source::<T>(variant);
