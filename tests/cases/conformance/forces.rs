@@ -70,7 +70,8 @@ pub(super) fn forced_crystals_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: us
 
 /// Each number of a force and of what is kept is in the comparison: with another one on the GPU, it fails.
 pub(super) fn another_force_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let changes: [(&str, fn(&mut Run<f64>)); 6] = [
+    type Change = fn(&mut Run<f64>);
+    let changes: [(&str, Change); 6] = [
         ("force", |run| run.parameters.law[DRIVE] *= 1.1),
         ("gain", |run| run.parameters.law[FEEDBACK] *= 1.1),
         ("area of feedback", |run| run.parameters.law[FEEDBACK_AREA] *= 1.1),
