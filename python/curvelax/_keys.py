@@ -165,7 +165,7 @@ class Keys(TypedDict, total=False):
     form: Literal["paper", "geometric", "auto"]
     """What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force
     of the polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper.
-    By default paper; of crystals geometric."""
+    By default paper; geometric with energy, diffusivity, drive and conserve."""
 
     solver: Literal["auto", "gauss-seidel", "direct"]
     """Solver of the pentadiagonal systems. auto is gauss-seidel with tau and direct with adaptive. By default
