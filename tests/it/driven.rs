@@ -106,3 +106,26 @@ fn members_that_vanish_before_they_relax_are_censored_then() {
     let cell = &done.rows("ensemble.csv")[0];
     assert_eq!(number(cell, "t_relax_known"), (rows.len() - rows.iter().filter(early).count()) as f64);
 }
+
+#[test]
+fn a_mode_of_a_growing_circle_decays_as_theory_says_with_order_two() {
+    // ln(a(0)/a(t)) = m²(m²-1)/(3|F|) (1/R(0)³ - 1/R(t)³) for m = 3.
+    let (force, end) = (0.5, 0.02_f64);
+    let exact = 72.0 / (3.0 * force) * (1.0 - (1.0 + force * end).powi(-3));
+    let errors = [50, 100, 200].map(|n| {
+        let done = run(&format!(
+            "--shape flower:3:0.001 --drive -{force} --amplitude 0 --curves 1 --points {n} --adaptive=1e-6 --t-end {end} --snapshots 0,{end}"
+        ));
+        let rows = done.rows("snapshots.csv");
+        let [first, last] = [&rows[..n], &rows[n..]].map(|rows| {
+            // The part cos 3θ of the radii, over the area between the nodes.
+            let radii: Vec<[f64; 2]> =
+                rows.iter().map(|row| [number(row, "x"), number(row, "y")]).map(|[x, y]| [y.atan2(x), x.hypot(y)]).collect();
+            2.0 * radii.iter().map(|[angle, radius]| radius * (3.0 * angle).cos()).sum::<f64>() / n as f64
+        });
+        (first / last).ln() / exact - 1.0
+    });
+    let order = (errors[0] / errors[2]).abs().log2() / 2.0;
+    println!("{errors:.6?}, order {order:.2}");
+    assert!(errors[2].abs() < 3e-3 && order > 1.9, "{errors:?}, order {order}");
+}
