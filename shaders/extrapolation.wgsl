@@ -100,11 +100,10 @@ fn add_share(base: u32, share: real, change_x: vec, change_y: vec, change_k: vec
 fn finish_attempt() {
     let x = load_field(CURVE);
     let y = load_field(CURVE + 1u);
-    let by = Moves(load_field(BEFORE), load_field(BEFORE + 1u));
-    let nodes = windows(advanced(0u, x, by.x), advanced(1u, y, by.y));
+    let nodes = windows(advanced(0u, x, load_field(BEFORE)), advanced(1u, y, load_field(BEFORE + 1u)));
     new_x = nodes.a;
     new_y = nodes.b;
-    if FORCED { correct(x, y, by); }
+    if FORCED { correct(x, y, Moves(load_field(BEFORE), load_field(BEFORE + 1u))); }
     displaced(x, y);
     new_k = advanced(2u, load_field(CURVE + 2u), load_field(BEFORE + 2u));
     new_r = advanced(3u, load_field(CURVE + 3u), load_field(BEFORE + 3u));
