@@ -13,8 +13,11 @@ fn ellipse(axes: &str, flags: &str, n: usize) -> (Row, Vec<Row>) {
     (done.summary().remove(0), done.rows("series.csv"))
 }
 
+/// Times and values.
+type Course = &'static [(f64, f64)];
+
 /// What is kept, of which half-axes with which area and length, and the energy, the length or the area at times.
-const SPECTRAL: [(&str, &str, [f64; 2], &str, &[(f64, f64)]); 6] = [
+const SPECTRAL: [(&str, &str, [f64; 2], &str, Course); 6] = [
     (
         "area",
         "2,1",
