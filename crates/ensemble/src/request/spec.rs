@@ -246,6 +246,11 @@ impl Spec {
         self.energy.is_some() || self.diffusivity.is_some()
     }
 
+    /// Whether limits n → ∞ have intervals: those of crystals and forced curves were not calibrated.
+    pub fn can_refine(&self) -> bool {
+        !self.has_crystals() && !self.is_forced()
+    }
+
     /// The excess at which a member that starts with `excess` counts as relaxed.
     pub fn threshold(&self, excess: f64) -> f64 {
         self.relax_at.unwrap_or(self.relax_to.unwrap_or(DEFAULT_RELAX_TO) * excess)

@@ -204,6 +204,8 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     // The interval of the limits says it already, together with what follows.
     let sampling = bounds.filter(|_| cell.limits.is_none());
     let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    // Members that start at rest have none.
+    let half = half.filter(|half| half.is_finite());
     let sampling =
         sampling.and(half).map_or(String::new(), |half| format!("sampling ±{} %; ", rounded(100.0 * half, 2)));
     let Some(discretisation) = &cell.discretisation else {
@@ -214,7 +216,11 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
-    let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
+    let remedy = match (spec.refine, spec.can_refine()) {
+        (true, _) => "t_error bounds them",
+        (false, true) => "use --refine, or more --points",
+        (false, false) => "use more --points",
+    };
     let bound = cell.limits.as_ref().and_then(|limits| limits.error);
     if let (false, Some(bound)) = (discretisation.converges(), bound) {
         return format!(
@@ -237,6 +243,7 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
             format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
         () if spec.refine => ": t_limit is free of it".into(),
+        () if larger && !spec.can_refine() => " dominates; use more --points".into(),
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => " dominates; add --refine to remove it".into(),
         () if larger => " dominates; add --accurate to remove it".into(),
         () => String::new(),
