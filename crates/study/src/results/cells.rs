@@ -489,7 +489,7 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
             lines[0],
-            "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,t_relax_known,t_relax_mean,t_relax_sd,\
+            "cell,shape,members,relaxed,unfinished,singular,nonfinite,stalled,vanished,t_relax_known,t_relax_mean,t_relax_sd,\
              t_relax_se,t_relax_restricted_to,t_relax_q05,t_relax_q25,t_relax_median,t_relax_q75,t_relax_q95,\
              t_relax_median_low,t_relax_median_high,rate_known,rate_mean,rate_sd,rate_se,rate_q05,rate_q25,\
              rate_median,rate_q75,rate_q95,rate_median_low,rate_median_high,rate_theory,rate_ratio,discretisation_known,\
@@ -497,10 +497,11 @@ mod tests {
              t_limit_median_low,t_limit_median_high,t_limit_error,t_relax_median_coverage,t_relax_q05_low,\
              t_relax_q05_high,t_relax_q25_low,t_relax_q25_high,t_relax_q75_low,t_relax_q75_high,t_relax_q95_low,\
              t_relax_q95_high,rate_median_coverage,rate_q05_low,rate_q05_high,rate_q25_low,rate_q25_high,rate_q75_low,\
-             rate_q75_high,rate_q95_low,rate_q95_high,t_limit_median_coverage"
+             rate_q75_high,rate_q95_low,rate_q95_high,t_limit_median_coverage,\
+             t_vanish_known,t_vanish_median,t_vanish_median_low,t_vanish_median_high"
         );
-        assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
-        assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
+        assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
+        assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
         assert!(lines[2].contains(",2.0,1.0,1.0,1.0,,,"), "the mean is restricted, the tail unknown: {}", lines[2]);
         assert!(statistics.comparison.refusal().is_some(), "{:?}", statistics.comparison);
         assert_eq!(statistics.scaling, None);
@@ -513,10 +514,15 @@ mod tests {
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
         // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75 %.
-        let later =
-            format!("{}2.0,,0{gap},0,,,0{}0.75{}2.0{}", ",".repeat(10), ",".repeat(8), ",".repeat(7), ",".repeat(11));
-        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0{later}"));
-        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}", ",".repeat(26)));
-        assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
+        let later = format!(
+            "{}2.0,,0{gap},0,,,0{}0.75{}2.0{}0,,,",
+            ",".repeat(10),
+            ",".repeat(8),
+            ",".repeat(7),
+            ",".repeat(12)
+        );
+        assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0,0{later}"));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}0,,,", ",".repeat(27)));
+        assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
     }
 }

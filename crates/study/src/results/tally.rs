@@ -547,7 +547,7 @@ mod tests {
         let tally = tally(&[1.0, 2.0], 3);
         assert_eq!((tally.members(), tally.steps, tally.sweeps_k, tally.sweeps_x), (5, 50, 100, 25));
         let counts: Vec<u64> = tally.counts().map(|(_, count)| count).collect();
-        assert_eq!(counts, [2, 3, 0, 0, 0]);
+        assert_eq!(counts, [2, 3, 0, 0, 0, 0]);
     }
 
     #[test]
