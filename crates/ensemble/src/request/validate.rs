@@ -339,14 +339,7 @@ impl Spec {
                 format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
             return refused(&problem, "leave out one of the two");
         }
-        if self.form == Some(PositionForm::Paper) {
-            let problem = format!("with it a crystal creeps at rest, and --{key} {value} is given");
-            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
-        }
-        if self.refine {
-            let problem = format!("its intervals were calibrated without crystals, and --{key} {value} is given");
-            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
-        }
+        self.check_geometric("with it a crystal creeps at rest", "crystals", &format!("--{key} {value}"))?;
         let waves =
             [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
         let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
@@ -359,6 +352,20 @@ impl Spec {
         }
     }
 
+    /// Refuses what no flow has that moves in the geometric form only: the paper's form, for the reason `in_paper`, and limits,
+    /// whose intervals were calibrated `without` the flag that is `given`.
+    fn check_geometric(&self, in_paper: &str, without: &str, given: &str) -> Result<()> {
+        if self.form == Some(PositionForm::Paper) {
+            let problem = format!("{in_paper}, and {given} is given");
+            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
+        }
+        if self.refine {
+            let problem = format!("its intervals were calibrated without {without}, and {given} is given");
+            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+        }
+        Ok(())
+    }
+
     /// Refuses what a driven flow does not have.
     fn check_forcing(&self) -> Result<()> {
         self.check_conserved()?;
@@ -368,16 +375,8 @@ impl Spec {
             let problem = format!("a flow is driven or keeps something, and --conserve {conserved} is given");
             return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
         }
-        if self.form == Some(PositionForm::Paper) {
-            let problem = format!("its steps do not see errors of the nodes, and --drive {drive} is given");
-            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
-        }
-        if self.refine {
-            let problem =
-                format!("its intervals were calibrated without a driving force, and --drive {drive} is given");
-            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
-        }
-        Ok(())
+        let given = format!("--drive {drive}");
+        self.check_geometric("its steps do not see errors of the nodes", "a driving force", &given)
     }
 
     /// Refuses what a flow that keeps its area or its length does not have.
@@ -396,15 +395,8 @@ impl Spec {
             let allowed = "leave it out, or use --flow willmore, elastic or poly";
             return refused("surface diffusion keeps the area anyway, and could not keep the length", allowed);
         }
-        if self.form == Some(PositionForm::Paper) {
-            let problem = format!("it would not keep anything exactly, and --conserve {conserved} is given");
-            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
-        }
-        if self.refine {
-            let problem =
-                format!("its intervals were calibrated without constraints, and --conserve {conserved} is given");
-            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
-        }
+        let given = format!("--conserve {conserved}");
+        self.check_geometric("it would not keep anything exactly", "constraints", &given)?;
         if conserved == Conserved::AreaAndLength {
             if let Some(excess) = self.relax_at {
                 let problem = "with area and length the excess stays as it is";
