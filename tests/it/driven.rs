@@ -92,19 +92,24 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     // It relaxed on its way.
     assert!((0.5..2.0).contains(&number(row, "t_relax")));
     let small = number(&done.rows("events.csv")[0], "t");
-    assert!(small < number(row, "t_end") && small > 0.6 * t, "{small}");
+    assert!(small < number(row, "t_end"), "{small}");
+    // It is round by then.
+    let left = 0.3 * number(row, "length_start") / (2.0 * PI * 0.5);
+    assert!(((t - small) / left - 1.0).abs() < 1e-3, "{t} {small} {left}");
     // The area falls at the rate F L, and theory has no rate.
     assert_eq!(done.rows("rates.csv")[0]["rate_theory"], "");
 }
 
 #[test]
 fn members_that_vanish_before_they_relax_are_censored_then() {
-    let done = run("--shape ellipse:2,1 --drive 6 --curves 8 --adaptive --pull auto --t-end auto --points 64");
+    let drive = "--drive uniform(4..20)";
+    let done = run(&format!("--shape ellipse:2,1 {drive} --curves 8 --adaptive --pull auto --t-end auto --points 64"));
     let rows = done.summary();
-    let early = |row: &&Row| row["t_relax"].is_empty();
-    assert!(rows.iter().any(|row| row["status"] == "vanished"));
+    assert!(rows.iter().all(|row| row["status"] == "vanished"));
+    let (early, relaxed): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row["t_relax"].is_empty());
+    assert!(early.len() > 1 && relaxed.len() > 1, "{} {}", early.len(), relaxed.len());
     let cell = &done.rows("ensemble.csv")[0];
-    assert_eq!(number(cell, "t_relax_known"), (rows.len() - rows.iter().filter(early).count()) as f64);
+    assert_eq!(number(cell, "t_relax_known"), relaxed.len() as f64);
 }
 
 #[test]
