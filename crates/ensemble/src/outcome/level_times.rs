@@ -56,7 +56,7 @@ impl Ladder {
         }
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
         let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
-        let (turn, excess) = (finest.turn, spec.threshold(finest.excess));
+        let (turn, excess) = (turn(spec, finest), spec.threshold(finest.excess));
         let tolerance = tolerance(spec);
         Some(Limit::of(&Times { own, levels: times, points, own_level, tolerance, is_adaptive, turn, excess }))
     }
@@ -106,7 +106,7 @@ impl LevelTimes {
         let Some(own) = self.time(RefinementLevel::FULL, member).filter(|own| *own > 0.0) else { return false };
         let (false, Some(finest)) = (ladder.levels.is_empty(), self.at(top, member)) else { return false };
         // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
-        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more(finest.turn))
+        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more(turn(spec, finest)))
     }
 
     /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the errors of its times, if it
@@ -173,6 +173,12 @@ impl LevelTimes {
         let at = self.place(level, member)? * count + place;
         self.events.get(rank(level))?.get(at).copied().filter(|t| t.is_finite())
     }
+}
+
+/// The largest turn at a node, as that of a plain curve that is resolved as well. The pilot, which only estimates, goes by that of
+/// the tangent.
+fn turn(spec: &Spec, at: &AtLevel) -> f64 {
+    if spec.refine { spec.turns() * at.turn } else { at.turn }
 }
 
 /// The place of a level among all.

@@ -41,6 +41,9 @@ pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
 /// Fraction of the initial excess at which a member is relaxed.
 pub const DEFAULT_RELAX_TO: f64 = 0.01;
 
+/// [`Spec::turns`] of curves that keep their length (`docs/internals/method.md#limit`).
+const LENGTH_TURNS: f64 = 2.0;
+
 impl Spec {
     /// Sets what `--accurate` stands for, except the keys that are `given` beside it.
     pub fn make_accurate(&mut self, given: &[String]) {
@@ -208,8 +211,13 @@ impl Spec {
 
     /// Whether members are driven inwards by a constant force, at least some: they are followed until they vanish.
     fn may_vanish(&self) -> bool {
+        self.is_driven_inwards() || self.sweep.has("drive")
+    }
+
+    /// Whether a constant force drives members inwards.
+    pub(crate) fn is_driven_inwards(&self) -> bool {
         let inwards = |drive: &Drawn<Drive>| matches!(drive.typical(), Drive::Constant(force) if *force > 0.0);
-        self.drive.as_ref().is_some_and(inwards) || self.sweep.has("drive")
+        self.drive.as_ref().is_some_and(inwards)
     }
 
     /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
@@ -246,9 +254,22 @@ impl Spec {
         self.energy.is_some() || self.diffusivity.is_some()
     }
 
-    /// Whether limits n → ∞ have intervals: those of crystals and forced curves were not calibrated.
+    /// Whether relaxation times have limits n → ∞ that intervals hold: not where the end is known only when it is reached, nor
+    /// where members are followed until they vanish, whose t_vanish has none.
     pub fn can_refine(&self) -> bool {
-        !self.has_crystals() && !self.is_forced()
+        !self.keeps_both() && !self.may_vanish()
+    }
+
+    /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ and M turns m
+    /// times as fast as the tangent, and that of the highest one must be resolved, too; where the length is kept, it is
+    /// measured.
+    pub(crate) fn turns(&self) -> f64 {
+        if self.conserve == Some(Conserved::Length) {
+            return LENGTH_TURNS;
+        }
+        let energy = self.energy.as_ref().and_then(|of| of.typical().waves().highest_mode());
+        let diffusivity = self.diffusivity.as_ref().and_then(|of| of.typical().waves().highest_mode());
+        energy.max(diffusivity).unwrap_or(1).max(1).into()
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.

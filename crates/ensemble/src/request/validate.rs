@@ -339,7 +339,7 @@ impl Spec {
                 format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
             return refused(&problem, "leave out one of the two");
         }
-        self.check_geometric("with it a crystal creeps at rest", "crystals", &format!("--{key} {value}"))?;
+        self.check_geometric("with it a crystal creeps at rest", &format!("--{key} {value}"))?;
         let waves =
             [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
         let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
@@ -352,18 +352,23 @@ impl Spec {
         }
     }
 
-    /// Refuses what no flow has that moves in the geometric form only: the paper's form, for the reason `in_paper`, and limits,
-    /// whose intervals were calibrated `without` the flag that is `given`.
-    fn check_geometric(&self, in_paper: &str, without: &str, given: &str) -> Result<()> {
-        if self.form == Some(PositionForm::Paper) {
-            let problem = format!("{in_paper}, and {given} is given");
-            return Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"));
+    /// Refuses the paper's form, for the reason `in_paper`, where something is `given` for which nodes move in the geometric form.
+    fn check_geometric(&self, in_paper: &str, given: &str) -> Result<()> {
+        match self.form {
+            Some(PositionForm::Paper) => {
+                let problem = format!("{in_paper}, and {given} is given");
+                Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"))
+            }
+            _ => Ok(()),
         }
-        if self.refine {
-            let problem = format!("its intervals were calibrated without {without}, and {given} is given");
-            return Err(Error::value("refine", true, &problem, "use --refine=false, and compare --points by a sweep"));
+    }
+
+    /// Refuses limits for the reason `why`.
+    fn check_limits(&self, has_none: bool, why: &str) -> Result<()> {
+        match self.refine && has_none {
+            true => Err(Error::value("refine", true, why, "use --refine=false, and compare --points by a sweep")),
+            false => Ok(()),
         }
-        Ok(())
     }
 
     /// Refuses what a driven flow does not have.
@@ -376,7 +381,9 @@ impl Spec {
             return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
         }
         let given = format!("--drive {drive}");
-        self.check_geometric("its steps do not see errors of the nodes", "a driving force", &given)
+        let vanish = format!("members are followed until they vanish, with {given}, and t_vanish has no limit yet");
+        self.check_limits(self.is_driven_inwards(), &vanish)?;
+        self.check_geometric("its steps do not see errors of the nodes", &given)
     }
 
     /// Refuses what a flow that keeps its area or its length does not have.
@@ -396,7 +403,10 @@ impl Spec {
             return refused("surface diffusion keeps the area anyway, and could not keep the length", allowed);
         }
         let given = format!("--conserve {conserved}");
-        self.check_geometric("it would not keep anything exactly", "constraints", &given)?;
+        let late =
+            format!("the end is known only when it is reached, with {given}: intervals were found to miss times");
+        self.check_limits(conserved == Conserved::AreaAndLength, &late)?;
+        self.check_geometric("it would not keep anything exactly", &given)?;
         if conserved == Conserved::AreaAndLength {
             if let Some(excess) = self.relax_at {
                 let problem = "with area and length the excess stays as it is";

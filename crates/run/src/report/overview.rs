@@ -360,7 +360,7 @@ results    out: summary.csv, run.json
             )),
             "{some}"
         );
-        // A driven flow has no --refine.
+        // One that is driven inwards has no --refine.
         let some = of(driven(), &tally);
         assert!(
             some.ends_with(&format!("{about}; times of 1 of them do not converge yet in n: use more --points")),

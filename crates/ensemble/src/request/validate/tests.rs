@@ -81,7 +81,6 @@ const REFUSED: &[(&str, &str)] = &[
         "energy = 'cos:4,0.03'\nform = 'paper'",
         "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03",
     ),
-    ("energy = 'cos:4,0.03'\nrefine = true", "--refine true: its intervals were calibrated without crystals, and "),
     (
         "diffusivity = 'cos:9,0.5'\npoints = 32",
         "--diffusivity cos:9,0.5: 32 nodes resolve no wave above 8; use --points 36 or more, or a lower M",
@@ -92,7 +91,7 @@ const REFUSED: &[(&str, &str)] = &[
     ),
     (
         "drive = 0.5\nrefine = true",
-        "--refine true: its intervals were calibrated without a driving force, and --drive 0.5",
+        "--refine true: members are followed until they vanish, with --drive 0.5, and t_vanish has no limit yet; use",
     ),
     (
         "drive = 0.5\nflow = 'willmore'\nconserve = 'length'",
@@ -104,7 +103,10 @@ const REFUSED: &[(&str, &str)] = &[
         "conserve = 'area'\nflow = 'willmore'\nform = 'paper'",
         "--form paper: it would not keep anything exactly, and --conserve area is given; use --form geometric",
     ),
-    ("conserve = 'area'\nflow = 'willmore'\nrefine = true", "--refine true: its intervals were calibrated without con"),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nrefine = true",
+        "--refine true: the end is known only when it is reached, with --conserve area,length: ",
+    ),
     (
         "conserve = 'area,length'\nflow = 'willmore'\nrelax-at = 0.1",
         "--relax-at 0.1: with area and length the excess stays as it is; use --relax-to",
@@ -204,7 +206,9 @@ const ACCEPTED: &[&str] = &[
     "energy = 'cos:2,0.1,30+cos:4,0.01'\ndiffusivity = 'cos:4,0.5'\nform = 'geometric'",
     "energy = 'cos:4,uniform(0.01..0.03)'",
     "drive = 0.5\nform = 'geometric'",
-    "drive = -0.5\nenergy = 'cos:3,0.05'",
+    "drive = -0.5\nenergy = 'cos:3,0.05'\nrefine = true",
+    "drive = 'feedback:1,3'\nrefine = true",
+    "conserve = 'length'\nflow = 'willmore'\nrefine = true",
     "drive = 'feedback:uniform(1..2),3'\nflow = 'willmore'",
     "conserve = 'area'\nflow = 'elastic:0.5'\nconserve-at = [3]\nform = 'geometric'",
     "conserve = 'area,length'\nflow = 'poly:0.5'\nreduced-area = 'uniform(0.5..0.9)'\nt-end = 'auto'",
