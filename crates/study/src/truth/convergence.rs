@@ -1,6 +1,9 @@
 //! A problem at one resolution, and at several: error and order.
 
-use super::{Problem, problems::Resolution};
+use super::{
+    Problem,
+    problems::{Beside, Resolution},
+};
 use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
@@ -30,6 +33,9 @@ impl Solved {
 impl Problem {
     /// Returns `method` with the problem's own keys: what to ask `curvelax run` for, if the curve had a name.
     pub fn spec(&self, method: &Spec, at: Resolution) -> Spec {
+        let energy = if let Beside::Energy(energy) = self.beside { Some(energy.into()) } else { None };
+        let drive = if let Beside::Drive(drive) = self.beside { Some(drive.into()) } else { None };
+        let conserve = if let Beside::Conserved(conserved) = self.beside { Some(conserved) } else { None };
         Spec {
             curves: 1,
             points: at.n,
@@ -39,6 +45,9 @@ impl Problem {
             tau: at.tolerance.is_none().then_some(at.tau.into()),
             adaptive: at.tolerance,
             t_end: Some(self.t_end.into()),
+            energy,
+            drive,
+            conserve,
             ..method.clone()
         }
     }

@@ -32,7 +32,7 @@ mod work_precision;
 
 pub use convergence::{ConvergenceRow, ConvergenceStudy, Solved, Varied, studies};
 pub use measure::{Measure, mode_amplitude};
-pub use problems::{ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
+pub use problems::{Beside, ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
 pub use referee::{Referee, Truth};
 pub use refereed::{RefereeRow, RefereedTime, limits, one_curve, relaxation_truth};
 pub use theory::{CircleMode, circle_mode};

@@ -1,7 +1,7 @@
 //! The single table of problems: each with its exact solution, the measured quantity, its error bound, and the result
 //! of a known mistake, whose error must exceed the bound.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use glam::DVec2;
 
@@ -9,7 +9,11 @@ use super::{Measure, circle_mode};
 use curvelax_base::error::{Error, Result, did_you_mean};
 use curvelax_curve::{BaseCurve, Sampling};
 use curvelax_ensemble::request::spec::Precision;
-use curvelax_flow::flow::Flow;
+use curvelax_flow::{
+    crystal::Energy,
+    flow::Flow,
+    forcing::{Conserved, Drive, Forcing},
+};
 
 /// Length of the lemniscate of half-width 1: 4·∫₀¹ dx/√(1-x⁴).
 const LEMNISCATE: f64 = 5.244_115_108_584_239;
@@ -43,10 +47,33 @@ pub enum StartCurve {
     },
     /// `r = 1 + a·cos mθ` with a small a that depends on the precision.
     Mode(u32),
+    /// The Wulff shape of [`CRYSTAL`] with a small wave that keeps its form.
+    Wulff,
     /// `(2 cos 2πu, sin 2πu)`.
     Ellipse,
     /// `(cos v, sin v cos v)/(1 + sin² v)`, v = 2πu: of half-width 1 and turning number 0.
     Lemniscate,
+}
+
+/// The energy of the crystal, a small wave on its Wulff shape that keeps its form, by the factors of cos 2ψ, cos 6ψ, … in the
+/// support function, and the rate at which it decays: an eigenvector of the theory of `docs/internals/method.md#crystals`.
+const CRYSTAL: &str = "cos:4,0.03";
+const CRYSTAL_WAVE: [f64; 5] = [1.0, -3.401_574_638e-2, 9.336_140_23e-4, -2.003_020_95e-5, 1.715_918_6e-7];
+const CRYSTAL_SIZE: f64 = 5e-3;
+const CRYSTAL_RATE: f64 = 15.427_810_720;
+
+/// What a flow has beside its own law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Beside {
+    /// Nothing.
+    #[default]
+    Nothing,
+    /// A surface energy that depends on the direction.
+    Energy(Energy),
+    /// A driving force.
+    Drive(Drive),
+    /// Something is kept.
+    Conserved(Conserved),
 }
 
 /// A problem with an exact solution.
@@ -56,6 +83,8 @@ pub struct Problem {
     pub name: String,
     /// The law of motion.
     pub flow: Flow,
+    /// What acts beside it.
+    pub beside: Beside,
     /// The start.
     pub curve: StartCurve,
     /// Final time.
@@ -153,6 +182,21 @@ impl StartCurve {
                 let radius = move |theta: f64| 1.0 + a * (f64::from(m) * theta).cos();
                 BaseCurve::from_formula(move |u| radius(TAU * u) * DVec2::from_angle(TAU * u))
             }
+            StartCurve::Wulff => {
+                // Steps see the errors of the whole curve, so that a wave that is far smaller is lost in them. The terms that are
+                // neglected are of its square.
+                let (a, energy) = (StartCurve::amplitude(precision).max(CRYSTAL_SIZE), crystal());
+                BaseCurve::from_formula(move |u| {
+                    let psi = TAU * u;
+                    let normal = DVec2::from_angle(psi);
+                    let waves = CRYSTAL_WAVE.iter().zip([2.0, 6.0, 10.0, 14.0, 18.0]);
+                    let wave = |(size, m): (&f64, f64)| {
+                        let (sine, cosine) = (m * psi).sin_cos();
+                        a * size * (cosine * normal - m * sine * normal.perp())
+                    };
+                    energy.wulff_point(psi) + waves.map(wave).sum::<DVec2>()
+                })
+            }
             StartCurve::Ellipse => BaseCurve::from_formula(|u| DVec2::new(2.0, 1.0) * DVec2::from_angle(TAU * u)),
             StartCurve::Lemniscate => BaseCurve::from_formula(|u| {
                 let (sin, cos) = (TAU * u).sin_cos();
@@ -165,7 +209,7 @@ impl StartCurve {
     pub fn sampling(self) -> Sampling {
         match self {
             StartCurve::Circle { .. } | StartCurve::Mode(_) => Sampling::Parameter,
-            StartCurve::Ellipse | StartCurve::Lemniscate => Sampling::Arclength,
+            StartCurve::Wulff | StartCurve::Ellipse | StartCurve::Lemniscate => Sampling::Arclength,
         }
     }
 }
@@ -175,6 +219,9 @@ pub fn problems() -> Vec<Problem> {
     let mut all = circles();
     all.extend((2..=6).flat_map(modes));
     all.extend([ellipse_area(), ellipse_length(), lemniscate()]);
+    all.extend(driven());
+    all.extend(kept());
+    all.push(crystal_wave());
     all
 }
 
@@ -184,6 +231,7 @@ fn circles() -> Vec<Problem> {
     let circle = |name: &str, flow: Flow, turns: u32, space: f64| Problem {
         name: name.into(),
         flow,
+        beside: Beside::Nothing,
         curve: StartCurve::Circle { radius: 1.0, turns },
         t_end: 1.0,
         measure: Measure::Radius,
@@ -217,6 +265,7 @@ fn modes(m: u32) -> Vec<Problem> {
         Problem {
             name: format!("{name}-mode-{m}"),
             flow,
+            beside: Beside::Nothing,
             curve: StartCurve::Mode(m),
             t_end,
             measure: Measure::Decay(m),
@@ -263,6 +312,7 @@ fn ellipse_area() -> Problem {
     Problem {
         name: "ellipse-area".into(),
         flow: Flow::SurfaceDiffusion,
+        beside: Beside::Nothing,
         curve: StartCurve::Ellipse,
         t_end: 0.1,
         measure: Measure::Area,
@@ -295,6 +345,7 @@ fn lemniscate() -> Problem {
     Problem {
         name: "lemniscate".into(),
         flow: Flow::SurfaceDiffusion,
+        beside: Beside::Nothing,
         curve: StartCurve::Lemniscate,
         t_end,
         measure: Measure::Length,
@@ -304,6 +355,92 @@ fn lemniscate() -> Problem {
         bound: ErrorBound { space: 5.3e-3, time: 5e-2, single: 1e-3 },
         n: 66,
         steps: 200,
+    }
+}
+
+/// A circle that is driven inwards, and a small mode 3 of one that is driven outwards: ln(a(0)/a(t)) is
+/// m²(m²-1)/(3|F|) (1/R(0)³ - 1/R(t)³).
+fn driven() -> [Problem; 2] {
+    let circle = Problem {
+        name: "driven-circle".into(),
+        flow: Flow::SurfaceDiffusion,
+        beside: Beside::Drive(Drive::Constant(0.5)),
+        curve: StartCurve::Circle { radius: 1.0, turns: 1 },
+        t_end: 0.5,
+        measure: Measure::Area,
+        exact: 0.5625 * PI,
+        mistaken: 0.5 * PI,
+        mistake: "the area falls at the rate F L(0)",
+        // Nodes of a regular polygon move exactly, whatever the step.
+        bound: ErrorBound { space: 8.5e-4, time: 1e-9, single: 1e-4 },
+        n: 66,
+        steps: 200,
+    };
+    let (force, m2, t_end) = (10.0_f64, 9.0, 0.02);
+    let decay = m2 * (m2 - 1.0) / (3.0 * force) * (1.0 - (1.0 + force * t_end).powi(-3));
+    let mode = Problem {
+        name: "driven-mode-3".into(),
+        beside: Beside::Drive(Drive::Constant(-force)),
+        curve: StartCurve::Mode(3),
+        t_end,
+        measure: Measure::Decay(3),
+        exact: decay,
+        mistaken: m2 * (m2 - 1.0) * t_end,
+        mistake: "a circle that does not grow",
+        bound: ErrorBound { space: 6.5e-3, time: 1.5e-2, single: 4e-3 },
+        steps: 100,
+        ..circle.clone()
+    };
+    [circle, mode]
+}
+
+/// A small mode 2 under Willmore flow that keeps the area, and so the circle, or the length.
+fn kept() -> [Problem; 2] {
+    let of = |name: &str, conserved: Conserved, [space, time]: [f64; 2], mistaken: f64, mistake| {
+        let forcing = Forcing { conserved: Some(conserved), ..Forcing::default() };
+        let t_end = 1.0 / forcing.linear_rate(&Flow::Willmore, 2, 1.0);
+        Problem {
+            name: name.into(),
+            flow: Flow::Willmore,
+            beside: Beside::Conserved(conserved),
+            curve: StartCurve::Mode(2),
+            t_end,
+            measure: Measure::Decay(2),
+            exact: 1.0,
+            mistaken: mistaken * t_end,
+            mistake,
+            bound: ErrorBound { space, time, single: 4e-3 },
+            n: 66,
+            steps: 100,
+        }
+    };
+    [
+        of("area-kept-mode-2", Conserved::Area, [3.5e-3, 2.3e-2], 9.0, "the rate (m²-1)² of a kept length"),
+        of("length-kept-mode-2", Conserved::Length, [3.3e-3, 2.1e-2], 7.5, "the rate (m²-1)(m²-3/2) of a kept area"),
+    ]
+}
+
+/// The energy of the crystal.
+fn crystal() -> Energy {
+    CRYSTAL.parse().expect("a valid energy")
+}
+
+/// A small wave on a Wulff shape, until it has decayed to 1/e.
+fn crystal_wave() -> Problem {
+    let energy = crystal();
+    Problem {
+        name: "crystal-wave".into(),
+        flow: Flow::SurfaceDiffusion,
+        beside: Beside::Energy(energy),
+        curve: StartCurve::Wulff,
+        t_end: 1.0 / CRYSTAL_RATE,
+        measure: Measure::Decay(2),
+        exact: 1.0,
+        mistaken: 12.0 * (PI / energy.wulff_area()).powi(2) / CRYSTAL_RATE,
+        mistake: "the rate of a circle of that area",
+        bound: ErrorBound { space: 1e-2, time: 1e-2, single: 4e-3 },
+        n: 66,
+        steps: 100,
     }
 }
 
