@@ -167,6 +167,8 @@ fn orders() -> Outcome {
             let found = last.ok_or_else(|| format!("{}: no order in {}", problem.name, study.varied.name()))?;
             // The lemniscate is so near its end that 400 steps do not yet show the full order.
             let (order, margin) = match (study.varied, problem.name.as_str()) {
+                // Fifty nodes do not yet resolve the four waves of a crystal.
+                (Varied::Nodes, "crystal-wave") => (2.0, 0.15),
                 (Varied::Nodes, _) => (2.0, 0.1),
                 // Nor do those of the geometric form.
                 (_, "lemniscate" | "area-kept-mode-2" | "length-kept-mode-2" | "crystal-wave") => (1.0, 0.2),
