@@ -185,3 +185,32 @@ fn turn(spec: &Spec, at: &AtLevel) -> f64 {
 fn rank(level: RefinementLevel) -> usize {
     level.number() as usize - 1
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whether a member that turns by `turn` at a node of 100 needs more of them, with times of order two.
+    fn needs(text: &str, turn: f64) -> bool {
+        let spec = Spec::from_toml(&format!("points = 100\nadaptive = 1e-3\n{text}")).unwrap();
+        let mut times = LevelTimes::default();
+        for level in RefinementLevel::FIRST {
+            let n = level.points(100) as f64;
+            let (level, turn, t_relax) = (level.number(), turn * 100.0 / n, Some(1.0 + 4.0 / (n * n)));
+            times.add(&LevelRow { level, turn, t_relax, excess_start: 0.2, ..LevelRow::default() }).unwrap();
+        }
+        times.needs(&spec, 0, RefinementLevel::of_number(4).unwrap())
+    }
+
+    #[test]
+    fn nodes_must_resolve_the_waves_of_a_crystal_and_more_where_the_length_is_kept() {
+        let crystal = "diffusivity = 'cos:4,0.5'\nenergy = 'cos:2,0.1'";
+        let kept = "flow = 'willmore'\nconserve = 'length'";
+        for (text, least) in [("", 0.7), (crystal, 0.175), (kept, 0.35), ("drive = -1", 0.7)] {
+            let refined = format!("{text}\nrefine = true");
+            assert!(!needs(&refined, 0.95 * least) && needs(&refined, 1.05 * least), "{text}");
+        }
+        // The pilot has no more nodes, and goes by the tangent.
+        assert!(!needs(crystal, 0.3));
+    }
+}
