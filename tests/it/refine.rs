@@ -15,16 +15,11 @@ use tempfile::TempDir;
 use crate::common::command::{self, stopped_after};
 
 /// The curves of the tests.
-const PROBLEMS: [&str; 10] = [
+const PROBLEMS: [&str; 6] = [
     "shape = 'ellipse:2,1'",
     "shape = 'circle:1'\namplitude = 0.1\nmodes = '2..=6'",
     "shape = 'ellipse:2,1'\nflow = 'willmore'",
     "shape = 'nonconvex'\namplitude = 0.02\nmodes = '2..=3'",
-    // Crystals, whose nodes must resolve the waves, too, and what acts from outside.
-    "shape = 'ellipse:2,1'\nenergy = 'cos:4,0.03'",
-    "shape = 'ellipse:3,1'\ndiffusivity = 'cos:3,0.7'",
-    "shape = 'ellipse:2,1'\ndrive = -0.3",
-    "shape = 'ellipse:2,1'\nflow = 'willmore'\nconserve = 'area'",
     // Deep thresholds and single modes, where ten times more exact steps take away only a part of their error.
     "shape = 'ellipse:2,1'\nrelax-to = 1e-6",
     "shape = 'circle:1'\namplitude = 0.2\nmodes = '2..=2'\nseed = 32",
