@@ -1,5 +1,6 @@
 // The page: its controls, the two workers, and what they tell.
 
+import { Film } from "./film.js";
 import { Instance } from "./instance.js";
 import { pad, show } from "./pad.js";
 import * as address from "./state.js";
@@ -7,6 +8,8 @@ import { Tiles } from "./tiles.js";
 
 /** Milliseconds between two drawings of the charts, and after the last change of a control until a run starts. */
 const CHARTS = 400, PAUSE = 400;
+/** Milliseconds in which a run is shown again. */
+const REPLAY = 5000;
 /** Charts are as wide as there is room, and readable. */
 const SIZE = "svg { display: block; width: 100%; min-width: 21rem; height: auto }";
 /** Outlines that come with the page. */
@@ -19,8 +22,8 @@ const still = matchMedia("(prefers-reduced-motion: reduce)");
 /** The number of the last run: one that still waits for its file gives way to a later one. */
 let compiled, library, dropped = null, later = 0, last = 0;
 const sides = {
-  cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), says: $("cpu-says") },
-  gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), says: $("gpu-says") },
+  cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), film: new Film(), says: $("cpu-says") },
+  gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), film: new Film(), says: $("gpu-says") },
 };
 
 /** Says something in the line that screen readers announce. */
@@ -90,13 +93,33 @@ function settings(chosen, outline) {
   };
 }
 
-// ---- a run
+// ---- a run, and once more
+
+/** The share of the run that is shown: the latest frame, unless a replay has begun at a time or one has chosen another. */
+const shownAt = { share: 1, since: null };
+
+/** Shows a share of the run. */
+function showAt(share) {
+  shownAt.share = share;
+  $("moment").value = share;
+  for (const side of Object.values(sides)) side.drawn = false;
+}
+
+function replay() {
+  Object.assign(shownAt, { share: 0, since: performance.now() });
+}
+
+/** Offers to see what has moved once more. */
+function offerReplay() {
+  $("again").hidden = !Object.values(sides).some((side) => side.film.moves);
+}
 
 function stop() {
   clearTimeout(later);
   last += 1;
   for (const side of Object.values(sides)) side.worker?.terminate();
   $("stop").disabled = true;
+  offerReplay();
 }
 
 async function run() {
@@ -123,9 +146,12 @@ async function run() {
     return;
   }
   $("difference").textContent = "";
+  $("again").hidden = true;
+  Object.assign(shownAt, { share: 1, since: null });
+  $("moment").value = 1;
   $("members").tBodies[0].replaceChildren();
   for (const [place, side] of Object.entries(sides)) {
-    Object.assign(side, { begins: null, frame: null, rows: new Map(), over: false, drawn: true });
+    Object.assign(side, { begins: null, frame: null, film: new Film(), rows: new Map(), over: false, drawn: true });
     side.tiles.clear();
     side.tiles.canvas.hidden = false;
     side.says.textContent = "starts …";
@@ -155,6 +181,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
     side.begins = begins;
   } else if (frame) {
     frame.ended.forEach((row) => side.rows.set(row.member, row));
+    side.film.add({ nodes: frame.nodes, done: frame.done });
     Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
     const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
     side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
@@ -165,6 +192,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
 
 function finish() {
   $("stop").disabled = true;
+  offerReplay();
   draw.charted = -Infinity;
   compare();
   const { cpu } = sides;
@@ -180,8 +208,13 @@ function finish() {
 function draw(now) {
   requestAnimationFrame(draw);
   const running = Object.values(sides).filter((side) => side.frame);
+  if (shownAt.since !== null) {
+    showAt(Math.min(1, (now - shownAt.since) / REPLAY));
+    if (shownAt.share === 1) shownAt.since = null;
+  }
   for (const side of running.filter((side) => !side.drawn)) {
-    side.tiles.draw(side.frame.nodes, side.begins.n, side.rows);
+    const { nodes, done } = side.film.at(shownAt.share);
+    side.tiles.draw(nodes, side.film.start.nodes, side.begins.n, new Set([...side.rows.keys()].slice(0, done)));
     [side.drawn, draw.isStale] = [true, true];
   }
   // At the start there is no line to draw.
@@ -292,6 +325,11 @@ async function begin() {
   $("settings").addEventListener("input", changed);
   $("settings").addEventListener("submit", (event) => { event.preventDefault(); run(); });
   $("stop").addEventListener("click", () => { stop(); say("Stopped."); $("run").focus(); });
+  $("replay").addEventListener("click", replay);
+  $("moment").addEventListener("input", ({ target }) => {
+    shownAt.since = null;
+    showAt(target.valueAsNumber);
+  });
   $("copy").addEventListener("click", () =>
     navigator.clipboard.writeText($("command").textContent).then(() => say("Copied."), () => say("Not copied.", true)));
   $("file").addEventListener("change", ({ target }) => take(target.files[0]));
