@@ -34,13 +34,22 @@ function say(words, wrong = false) {
 
 // ---- settings
 
+/** Lets ε go as far as the library allows with so many waves. */
+function bound() {
+  const { eps } = library.ask({ ask: "strongest", waves: state.waves });
+  $("eps").max = eps;
+  $("strongest").textContent = `1/(M² - 1) = ${(1 / (state.waves ** 2 - 1)).toFixed(4)}`;
+}
+
 function controls() {
+  if (![...$("waves").options].some((option) => option.value === `${state.waves}`)) state.waves = address.DEFAULTS.waves;
+  bound();
   for (const key of Object.keys(address.DEFAULTS).filter((key) => key !== "points")) $(key).value = state[key];
   $("points").value = address.decoded(state.points);
   // What the controls show is what runs.
   for (const control of document.querySelectorAll("#settings select, #settings input[type=range]")) {
     if (control.value === "") control.value = address.DEFAULTS[control.id];
-    state[control.id] = control.type === "range" ? control.valueAsNumber : control.value;
+    state[control.id] = typeof address.DEFAULTS[control.id] === "number" ? Number(control.value) : control.value;
   }
   shown();
 }
@@ -50,6 +59,7 @@ function shown() {
   document.querySelectorAll("output").forEach((output) => { output.value = $(output.htmlFor.value).value; });
   document.querySelectorAll("[data-shape]").forEach((part) => { part.hidden = part.dataset.shape !== state.shape; });
   document.querySelectorAll("[data-flow]").forEach((part) => { part.hidden = part.dataset.flow !== state.flow; });
+  $("crystal").hidden = state.flow !== "surface-diffusion" || !(state.eps > 0);
   show($("pad"), address.pointsOf($("points").value));
 }
 
@@ -84,11 +94,12 @@ function offer(outline) {
 
 /** The chosen settings as the library takes them. */
 function settings(chosen, outline) {
-  const { shape, aspect, petals, flow, lambda, steps, amplitude, n, curves, seed } = chosen;
+  const { shape, aspect, petals, flow, lambda, waves, eps, steps, amplitude, n, curves, seed } = chosen;
   const shapes = { ellipse: `ellipse:${aspect},1`, circle: "circle:1", flower: `flower:${petals}:0.3` };
   return {
     shape: outline ? `file:${outline.name}` : shapes[shape] ?? shape,
     flow: flow === "elastic" ? `elastic:${lambda}` : flow,
+    energy: flow === "surface-diffusion" && eps > 0 ? `cos:${waves},${eps}` : null,
     amplitude, n, curves, seed, adaptive: steps !== "fixed",
   };
 }
@@ -214,7 +225,7 @@ function draw(now) {
   }
   for (const side of running.filter((side) => !side.drawn)) {
     const { nodes, done } = side.film.at(shownAt.share);
-    side.tiles.draw(nodes, side.film.start.nodes, side.begins.n, new Set([...side.rows.keys()].slice(0, done)));
+    side.tiles.draw(nodes, side.film.start.nodes, side.frame.rests, side.begins.n, new Set([...side.rows.keys()].slice(0, done)));
     [side.drawn, draw.isStale] = [true, true];
   }
   // At the start there is no line to draw.
@@ -283,11 +294,15 @@ function rows() {
 function changed({ target }) {
   if (!(target.id in address.DEFAULTS)) return;
   const isNumber = typeof address.DEFAULTS[target.id] === "number";
-  const value = isNumber ? target.valueAsNumber : target.value;
+  const value = isNumber ? Number(target.value || NaN) : target.value;
   if (isNumber && !address.holds(target.id, value)) {
     return say(`${target.labels[0].textContent}: give a whole number from 0 to ${Number.MAX_SAFE_INTEGER}.`, true);
   }
   state[target.id] = target.id === "points" ? address.coded(value) : value;
+  if (target.id === "waves") {
+    bound();
+    state.eps = $("eps").valueAsNumber;
+  }
   address.write(state);
   shown();
   again();

@@ -1,4 +1,4 @@
-// The members of a run, each in a tile of its own, in front of its outline at the start.
+// The members of a run, each in a tile of its own, in front of its outline at the start and of its Wulff shape.
 
 export class Tiles {
   /** Tiles on `canvas` in the colour of this name. */
@@ -11,8 +11,11 @@ export class Tiles {
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   }
 
-  /** Draws all members from their nodes, x and y of each, now and at the start; those that have ended are filled. */
-  draw(nodes, start, n, ended) {
+  /**
+   * Draws all members from their nodes, x and y of each, now and at the start; those that have ended are filled.
+   * `rests` has a Wulff shape for each, or is empty.
+   */
+  draw(nodes, start, rests, n, ended) {
     const { canvas } = this, members = nodes.length / (2 * n);
     const pixels = (size) => Math.round(size * devicePixelRatio);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map(pixels);
@@ -20,9 +23,9 @@ export class Tiles {
     let columns = 1;
     while (Math.floor(height / (width / columns)) * columns < members) columns++;
     const tile = width / columns, context = canvas.getContext("2d"), style = getComputedStyle(canvas);
-    const [before, moving, over] = [new Path2D(), new Path2D(), new Path2D()];
+    const [before, rest, moving, over] = [0, 1, 2, 3].map(() => new Path2D());
     for (let member = 0; member < members; member++) {
-      const of = (all) => all.subarray(2 * n * member, 2 * n * (member + 1));
+      const of = (all) => all.subarray(all.length / members * member, all.length / members * (member + 1));
       const [now, first] = [of(nodes), of(start)];
       if (Number.isNaN(now[0]) || Number.isNaN(first[0])) continue;
       // A curve keeps the scale of its start, so that one sees it grow or shrink.
@@ -35,6 +38,7 @@ export class Tiles {
         path.closePath();
       };
       add(before, first);
+      if (rests.length) add(rest, of(rests));
       add(ended.has(member) ? over : moving, now);
     }
     context.clearRect(0, 0, width, height);
@@ -49,6 +53,9 @@ export class Tiles {
     context.fill(over);
     context.globalAlpha = 1;
     stroke(before, "--start", 1);
+    context.setLineDash([4, 3].map((part) => part * devicePixelRatio));
+    stroke(rest, "--rest", 1.5);
+    context.setLineDash([]);
     stroke(over, this.colour, 1.5);
     stroke(moving, this.colour, 1.5);
   }
