@@ -58,7 +58,9 @@ def run(
         Contours of ``skimage.measure.find_contours`` are, too, but with rows and columns in the place of x and y, which
         mirrors the outline and changes no time: give ``contour[:, ::-1]`` to see it as the image shows it. Polygons of
         Shapely and all other objects with ``__geo_interface__`` are outlines; of a GeoSeries or GeoDataFrame the index is
-        the labels and its columns serve ``group_by``. ``amplitude`` and ``decay`` take a law such as ``"gamma(2,0.02)"``, an
+        the labels and its columns serve ``group_by``. A path to a ``.roi`` or ``.zip`` of ImageJ gives the polygons,
+        freehand and traced regions, rectangles and ovals in it, labelled by their names, in pixels with y downwards as in the
+        image; ``pip install roifile`` reads them. ``amplitude`` and ``decay`` take a law such as ``"gamma(2,0.02)"``, an
         array with a value for each member, or a frozen distribution of ``scipy.stats``.
 
     Returns
@@ -91,6 +93,9 @@ def run(
     existing = "replaced" if force else "refused"
     existed, written, kept = folder.exists(), None, None
     try:
+        regions = _regions_of(shape)
+        if regions is not None:
+            shape = regions
         if isinstance(shape, os.PathLike):
             keys["shape"] = f"file:{os.fspath(shape)}"
         elif _is_arrays(shape):
@@ -157,6 +162,16 @@ def load(out: str | os.PathLike[str]) -> Study:
 def _is_arrays(shape: Any) -> bool:
     """Whether a shape is given by points, not by its name or file."""
     return not isinstance(shape, (str, os.PathLike)) and shape is not None
+
+
+def _regions_of(shape: Any) -> Any:
+    """The outlines in a file of ImageJ, if the shape names one."""
+    if not isinstance(shape, (str, os.PathLike)):
+        return None
+    from . import _regions
+
+    path = _regions.named(shape)
+    return None if path is None else _regions.read(path)
 
 
 def _temporary() -> Path:

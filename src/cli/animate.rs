@@ -79,7 +79,8 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
     let path = args.out.clone().unwrap_or_else(|| args.run.join(names::MOVIE));
     let format = MovieFormat::of(&path)?;
     // Before a folder is opened, which would create a missing one.
-    let spec = reader::provenance(&args.run)?.spec;
+    let provenance = reader::provenance(&args.run)?;
+    let spec = &provenance.spec;
     let films = reader::films(&args.run)?;
     let cannot = |problem: &str| {
         let place = args.run.join(names::PORTRAITS);
@@ -88,7 +89,10 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
     if films.is_empty() {
         return cannot("no members to show: the run could not save them, or the file was removed; run again");
     }
-    let Some(movie) = Movie::new(&films, &spec, &cut) else {
+    // Only they are not in the portraits.
+    let tally = spec.refine.then(|| reader::tally(&args.run, &provenance)).transpose()?;
+    let limit = |member| tally.as_ref().and_then(|tally| tally.named(member)?.t_limit);
+    let Some(movie) = Movie::new(&films, spec, &cut, limit) else {
         return cannot("no member has a state that can be drawn; see `status` in summary.csv");
     };
     let file = MovieFile::open(&path, args.out.is_none() || args.force)?;

@@ -1,9 +1,14 @@
 //! `curvelax convergence`: the error of the scheme against exact solutions, and its order.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use super::{
-    flags, note, parsers, print,
+    flags, note,
+    paper::{PaperFlags, Prints},
+    parsers, print,
     referee::{RefereeFlags, referee},
 };
 use crate::{
@@ -21,6 +26,7 @@ use crate::{
         tables::Table,
         truth_tables::{CostRow, ErrorRow},
     },
+    paper::{Printer, told},
     placement,
     text::significant,
     truth::{ConvergenceRow, Problem, WorkPrecision, WorkRow, problems, studies},
@@ -32,6 +38,7 @@ Examples:
   curvelax convergence --problem willmore-circle --problem lemniscate --out convergence
   curvelax convergence --backend gpu --precision f32
   curvelax convergence --work-precision --out work
+  curvelax convergence --work-precision --out work --format png,pdf --width page
   curvelax convergence --referee --shape flower:3:0.2 --flow willmore
   curvelax convergence --referee --curves 100 --seed 2 --out referee
 
@@ -80,6 +87,8 @@ pub struct ConvergenceArgs {
     /// Write into an existing DIR, replacing these files in it
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
+    #[command(flatten)]
+    paper: PaperFlags,
     /// Print no notes and no table: only errors
     #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
@@ -87,6 +96,12 @@ pub struct ConvergenceArgs {
 
 /// Runs the command.
 pub fn convergence(args: ConvergenceArgs) -> Result<()> {
+    let prints = args.paper.prints()?;
+    if args.paper.is_given() && !(args.work_precision && args.out.is_some()) {
+        let remedy = "add --work-precision --out DIR, or leave out --format, --width and --dpi";
+        return Err(Error::Request(format!("only --work-precision draws a picture, into --out: {remedy}")));
+    }
+    let on_screen = args.paper.on_screen();
     let chosen = match args.problem.is_empty() {
         true => problems(),
         false => args.problem.iter().map(|name| Problem::named(name)).collect::<Result<_>>()?,
@@ -106,9 +121,9 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle(&mut method);
     let names = match (args.work_precision, refereed) {
-        (true, _) => vec![names::WORK, names::WORK_PICTURE],
-        (_, true) => vec![names::REFEREE],
-        _ => vec![names::CONVERGENCE],
+        (true, _) => [names::WORK.into()].into_iter().chain(pictures(on_screen, &prints)).collect(),
+        (_, true) => vec![names::REFEREE.into()],
+        _ => vec![names::CONVERGENCE.into()],
     };
     let folder = args.out.map(|out| open(&out, args.force, names)).transpose()?;
     if !args.quiet {
@@ -120,7 +135,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
     if args.work_precision {
         let solvers = solver.map_or(Solver::ALL.to_vec(), |_| vec![method.solver()]);
-        return work_precision(&method, &solvers, folder, args.quiet);
+        return work_precision(&method, &solvers, folder, args.quiet, (on_screen, &prints));
     }
     let mut rows = Vec::new();
     for problem in &chosen {
@@ -145,18 +160,36 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
 }
 
+const WORK_TITLE: &str = "What an error of the relaxation time costs";
+
+/// The file of the picture with this extension.
+fn work_picture(extension: &str) -> String {
+    names::WORK_PICTURE.replace("svg", extension)
+}
+
+fn pictures(on_screen: bool, prints: &Prints) -> impl Iterator<Item = String> {
+    let printed = prints.formats.iter().map(|(extension, _)| *extension);
+    on_screen.then_some("svg").into_iter().chain(printed).map(work_picture)
+}
+
 /// Checks a spec whose times follow its curves as they are made.
 fn checked(spec: Spec) -> Result<Spec> {
     let study = Study::new(spec)?;
     Ok(study.spec().clone())
 }
 
-fn open(out: &Path, force: bool, names: Vec<&str>) -> Result<OutputFolder> {
-    OutputFolder::open_for(out, force, Owner::Convergence, names.into_iter().map(str::to_owned).collect())
+fn open(out: &Path, force: bool, names: Vec<String>) -> Result<OutputFolder> {
+    OutputFolder::open_for(out, force, Owner::Convergence, names)
 }
 
 /// Measures what errors cost, with all `solvers`; prints the rows as they come.
-fn work_precision(method: &Spec, solvers: &[Solver], folder: Option<OutputFolder>, quiet: bool) -> Result<()> {
+fn work_precision(
+    method: &Spec,
+    solvers: &[Solver],
+    folder: Option<OutputFolder>,
+    quiet: bool,
+    (on_screen, prints): (bool, &Prints),
+) -> Result<()> {
     let measured = WorkPrecision::new(method)?;
     if !quiet {
         note(&measured.sentence());
@@ -175,8 +208,20 @@ fn work_precision(method: &Spec, solvers: &[Solver], folder: Option<OutputFolder
     if let Some(folder) = folder {
         let costs: Vec<CostRow> = rows.iter().flatten().map(CostRow::of).collect();
         let table = Table::of(folder.file(names::WORK)?, &costs)?;
-        let picture = folder.write(names::WORK_PICTURE, work_diagram(&measured, solvers, &rows))?;
-        folder.publish_all(vec![table, picture])?;
+        let mut files = vec![table];
+        if on_screen {
+            let svg = work_diagram(&measured, solvers, &rows, Medium::Screen);
+            files.push(folder.write(names::WORK_PICTURE, svg)?);
+        }
+        if !prints.formats.is_empty() {
+            let svg = work_diagram(&measured, solvers, &rows, Medium::Paper(prints.width.pixels()));
+            let mut missing = BTreeSet::new();
+            for (extension, content) in prints.of(&Printer::default(), (WORK_TITLE, &svg), &mut missing)? {
+                files.push(folder.write(&work_picture(extension), content)?);
+            }
+            told(&missing).iter().filter(|_| !quiet).for_each(|told| note(&format!("note: {told}")));
+        }
+        folder.publish_all(files)?;
     }
     match rows.iter().flatten().filter(|row| row.error.is_none()).count() {
         0 => Ok(()),
@@ -204,7 +249,7 @@ fn work_row(row: &WorkRow) -> String {
 }
 
 /// Errors against solves and seconds, a row of panels for each solver.
-fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRow>]) -> String {
+fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRow>], medium: Medium) -> String {
     let curve = |way: &Vec<WorkRow>| WorkCurve {
         label: match way.first().map_or(1, |row| row.stepping.order()) {
             1 => "fixed steps".into(),
@@ -217,12 +262,12 @@ fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRo
         curves: rows.iter().filter(|way| way.iter().all(|row| row.solver == *solver)).map(curve).collect(),
     };
     WorkDiagram {
-        title: "What an error of the relaxation time costs",
+        title: WORK_TITLE,
         note: &measured.sentence(),
         costs: [("solves per member", ""), ("time per member", "ms")],
         rows: solvers.iter().map(panels).collect(),
     }
-    .draw(Medium::Screen)
+    .draw(medium)
 }
 
 /// An aligned table, grouped by problem; a run that ended early has its status instead of its error.

@@ -1,16 +1,21 @@
 //! `curvelax figure`: the paper's figures and their data.
 
-use std::path::PathBuf;
+use std::{collections::BTreeSet, path::PathBuf};
 
 use clap::builder::PossibleValuesParser;
 
-use super::{note, print};
+use super::{
+    note,
+    paper::{PaperFlags, Prints},
+    print,
+};
 use crate::{
-    draw::plot::short,
+    draw::{medium::Medium, plot::short},
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
     files::{OutputFolder, Owner, tables::SnapshotTable},
+    paper::{Printer, told},
     report::progress::Progress,
 };
 
@@ -18,8 +23,9 @@ const EXAMPLES: &str = "\
 Examples:
   curvelax figure fig1a --out figures
   curvelax figure fig1a fig1b fig1c fig2 --out figures
+  curvelax figure fig2 --out figures --format pdf --width page
 
-Writes DIR/NAME.svg and DIR/NAME.csv, with the columns of snapshots.csv. It takes a few seconds on the CPU.";
+Writes DIR/NAME.svg (or .png and .pdf, by --format) and DIR/NAME.csv, with the columns of snapshots.csv. It takes a few seconds on the CPU.";
 
 /// Draw the paper's figures and write their data.
 #[derive(clap::Args)]
@@ -34,6 +40,8 @@ pub struct FigureArgs {
     /// Write into an existing DIR, replacing the files of these figures
     #[arg(long)]
     force: bool,
+    #[command(flatten)]
+    paper: PaperFlags,
     /// Print no progress, notes or table: only errors
     #[arg(long)]
     quiet: bool,
@@ -41,21 +49,33 @@ pub struct FigureArgs {
 
 /// Runs the command.
 pub fn figure(args: FigureArgs) -> Result<()> {
+    let prints = args.paper.prints()?;
     // In the paper's order, each once.
     let chosen = FIGURES.iter().filter(|figure| args.names.iter().any(|name| name == figure.name));
     let chosen: Vec<(&Figure, Spec)> = chosen.map(|figure| Ok((figure, figure.spec()?))).collect::<Result<_>>()?;
-    let names: Vec<[String; 2]> = chosen.iter().map(|(figure, _)| files(figure)).collect();
-    let folder = OutputFolder::open_for(&args.out, args.force, Owner::Figure, names.concat())?;
+    let names: Vec<String> =
+        chosen.iter().flat_map(|(figure, _)| files(figure, args.paper.on_screen(), &prints)).collect();
+    let folder = OutputFolder::open_for(&args.out, args.force, Owner::Figure, names.clone())?;
     if !args.quiet {
         note(SOLVED_DIRECTLY);
     }
     let (mut parts, mut made) = (Vec::new(), Vec::new());
-    for ((figure, spec), [picture, data]) in chosen.iter().zip(&names) {
+    let (printer, mut missing) = (Printer::default(), BTreeSet::new());
+    for (figure, spec) in &chosen {
         let ended = figure.simulate(spec, Progress::new(args.quiet))?;
-        let mut rows = SnapshotTable::new(folder.file(data)?)?;
+        let mut rows = SnapshotTable::new(folder.file(&file(figure, "csv"))?)?;
         ended.rows.snapshots.iter().try_for_each(|snapshot| rows.snapshot(snapshot))?;
         parts.push(rows.ready()?);
-        parts.push(folder.write(picture, figure.plot(&ended).draw())?);
+        let plot = figure.plot(&ended);
+        if args.paper.on_screen() {
+            parts.push(folder.write(&file(figure, "svg"), plot.draw(Medium::Screen))?);
+        }
+        if !prints.formats.is_empty() {
+            let svg = plot.draw(Medium::Paper(prints.width.pixels()));
+            for (extension, content) in prints.of(&printer, (&plot.title, &svg), &mut missing)? {
+                parts.push(folder.write(&file(figure, extension), content)?);
+            }
+        }
         made.push((*figure, ended));
         if !args.quiet {
             note(&format!("note: {}: {}", figure.name, figure.remark));
@@ -65,15 +85,21 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     if args.quiet {
         return Ok(());
     }
-    print(&format!("{}\nresults  {}: {}\n", table(&made), args.out.display(), names.concat().join(", ")))
+    told(&missing).iter().for_each(|told| note(&format!("note: {told}")));
+    print(&format!("{}\nresults  {}: {}\n", table(&made), args.out.display(), names.join(", ")))
 }
 
 const SOLVED_DIRECTLY: &str = "note: solved directly where the paper sweeps (Gauss-Seidel): the same systems, and the \
                                solution that sweeps converge to";
 
-/// Picture and data of a figure.
-fn files(figure: &Figure) -> [String; 2] {
-    ["svg", "csv"].map(|extension| format!("{}.{extension}", figure.name))
+fn file(figure: &Figure, extension: &str) -> String {
+    format!("{}.{extension}", figure.name)
+}
+
+/// Pictures and data of a figure.
+fn files(figure: &Figure, on_screen: bool, prints: &Prints) -> Vec<String> {
+    let printed = prints.formats.iter().map(|(extension, _)| *extension);
+    on_screen.then_some("svg").into_iter().chain(printed).chain(["csv"]).map(|of| file(figure, of)).collect()
 }
 
 /// The table: each figure's run and its last curve.

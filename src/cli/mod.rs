@@ -15,6 +15,7 @@ mod flags;
 mod man;
 mod manner;
 mod merge;
+mod paper;
 mod parsers;
 mod plot;
 mod referee;

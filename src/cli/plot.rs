@@ -5,17 +5,19 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use clap::ValueEnum;
-
-use super::{note, print};
+use super::{
+    note,
+    paper::{PictureFormat, Prints},
+    print,
+};
 use crate::{
-    error::{Error, Result},
+    error::Result,
     files::{
         OutputFolder, Owner, names,
         part_file::PartFile,
         reader::{self, Finished},
     },
-    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, told},
+    paper::{Printer, told},
     report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
@@ -61,44 +63,8 @@ pub struct PlotArgs {
     quiet: bool,
 }
 
-/// The formats of pictures.
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum PictureFormat {
-    Svg,
-    Png,
-    Pdf,
-}
-
-/// Pictures for papers, as they were asked for.
-struct Prints {
-    width: PaperWidth,
-    /// Extension and format.
-    formats: Vec<(&'static str, PaperFormat)>,
-}
-
 impl Prints {
-    /// # Errors
-    /// [`Error::Request`] for a wrong width or density, and for one that no format uses.
-    fn new(args: &PlotArgs) -> Result<Prints> {
-        let has = |format: PictureFormat| args.format.contains(&format);
-        let unused = |key: &str, value: &dyn std::fmt::Display, formats: &str| {
-            Err(Error::value(key, value, "no picture uses it", &format!("add --format {formats}, or leave it out")))
-        };
-        let png = PaperFormat::png(args.dpi.unwrap_or(USUAL_DPI))?;
-        let width = args.width.as_ref().map(|width| width.parse()).transpose()?.unwrap_or_default();
-        match (&args.width, args.dpi) {
-            (Some(width), _) if !has(PictureFormat::Png) && !has(PictureFormat::Pdf) => {
-                return unused("width", width, "png, or pdf");
-            }
-            (_, Some(dpi)) if !has(PictureFormat::Png) => return unused("dpi", &dpi, "png"),
-            _ => {}
-        }
-        let formats = [(PictureFormat::Png, ("png", png)), (PictureFormat::Pdf, ("pdf", PaperFormat::Pdf))];
-        let formats = formats.into_iter().filter(|(format, _)| has(*format)).map(|(_, paper)| paper).collect();
-        Ok(Prints { width, formats })
-    }
-
-    /// The files that may be written.
+    /// The files of plots that may be written.
     fn names(&self) -> impl Iterator<Item = &'static str> {
         let of = |(extension, _): &(&'static str, _)| {
             let extension = *extension;
@@ -115,11 +81,10 @@ impl Prints {
         }
         let printer = Printer::default();
         for picture in study.on_paper(self.width.pixels())? {
-            let print = printer.read(&picture.figure.title, &picture.figure.svg, self.width)?;
-            missing.append(&mut print.missing());
-            for (extension, format) in &self.formats {
+            let made = self.of(&printer, (&picture.figure.title, &picture.figure.svg), &mut missing)?;
+            for (extension, content) in made {
                 if let Some(name) = names::on_paper(picture.name, extension) {
-                    files.push(folder.write(name, print.file(*format)?)?);
+                    files.push(folder.write(name, content)?);
                 }
             }
         }
@@ -129,7 +94,7 @@ impl Prints {
 
 /// Runs the command.
 pub fn plot(args: PlotArgs) -> Result<()> {
-    let prints = Prints::new(&args)?;
+    let prints = Prints::new(&args.format, args.width.as_deref(), args.dpi)?;
     let on_screen = args.format.contains(&PictureFormat::Svg);
     // Before the folder is opened, which would create a missing one.
     reader::provenance(&args.run)?;

@@ -4,7 +4,7 @@ use std::{fs, path::Path, process::Output};
 
 use crate::common::{
     command::{curvelax, done},
-    program::{Done, run},
+    program::{Done, column, run},
 };
 use gif::{DisposalMethod, Repeat};
 
@@ -113,6 +113,26 @@ fn a_gif_shows_all_members_from_start_to_end() {
         let left = states[0].iter().map(|node| shown.darkest(FRAMES - 1, *node));
         assert!(left.clone().all(|c| c[0] < 200), "{:?}", left.collect::<Vec<_>>());
     }
+}
+
+#[test]
+fn movie_and_report_tell_the_limit_and_that_their_clock_is_raw() {
+    let raw = "t is raw, at the nodes of the run";
+    let of = |more: &str| {
+        let done = run(&format!("--curves 2 --points 64 --accurate --units um,h --mobility 2 {more}"));
+        animated(done.home.path(), &format!("out {SECOND} --out movie.svg"));
+        let movie = fs::read_to_string(done.home.path().join("movie.svg")).unwrap();
+        (movie, done.text("report.html"), done.summary())
+    };
+    let (movie, report, members) = of("");
+    assert!(movie.contains(raw) && report.contains(raw));
+    for limit in column(&members, "t_limit") {
+        let digits = 3 - limit.log10().floor() as i32;
+        let words = format!("relaxed, t_limit = {limit:.*} h", digits as usize);
+        assert!(movie.contains(&words) && report.contains(&words), "{words}");
+    }
+    let (movie, report, _) = of("--refine=false");
+    assert!(!movie.contains(raw) && !report.contains(raw) && movie.contains(">relaxed at t = "));
 }
 
 #[test]

@@ -119,3 +119,41 @@ fn what_no_picture_can_use_is_refused_before_anything_is_written() {
         assert!(!home.join("new").exists(), "{arguments}");
     }
 }
+
+#[test]
+fn figures_and_the_work_diagram_have_prints() {
+    let home = tempfile::TempDir::new().unwrap();
+    let done = |arguments: &str| {
+        let output = curvelax(home.path(), arguments);
+        assert!(output.status.success(), "{arguments}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    let read = |name: &str| fs::read(home.path().join(name)).unwrap();
+    done("figure fig1a fig2 --out plain --quiet");
+    done("figure fig1a fig2 --out all --quiet --format svg,png,pdf --dpi 100");
+    done("figure fig1a fig2 --out page --quiet --format png --dpi 100 --width page");
+    // Again, over the files of before.
+    done("figure fig1a fig2 --out page --quiet --format png --dpi 100 --width page --force");
+    for name in ["fig1a", "fig2"] {
+        assert!(read(&format!("plain/{name}.svg")) == read(&format!("all/{name}.svg")), "{name} for screens");
+        assert!(read(&format!("plain/{name}.csv")) == read(&format!("page/{name}.csv")), "data of {name}");
+        assert!(read(&format!("all/{name}.pdf")).starts_with(b"%PDF-1."), "{name}");
+        let [column, page] = ["all", "page"].map(|folder| size(&read(&format!("{folder}/{name}.png")))[0]);
+        assert_eq!([column, page], [335, 669], "{name}");
+    }
+    assert_eq!(names(&home.path().join("page"), "svg"), [""; 0]);
+    done("convergence --work-precision --solver direct --backend cpu --out work --quiet --format png --dpi 100");
+    assert_eq!(size(&read("work/work_precision.png"))[0], 335);
+    assert_eq!(names(&home.path().join("work"), "svg"), [""; 0]);
+    for (arguments, said) in [
+        ("figure fig1a --out none --width 90", "--width 90: no picture uses it; add --format png, or pdf"),
+        ("figure fig1a --out none --format pdf --dpi 300", "--dpi 300: no picture uses it; add --format png"),
+        ("figure fig1a --out none --format png --dpi 9", "--dpi 9: out of range"),
+        ("convergence --out none --format png", "only --work-precision draws a picture"),
+        ("convergence --work-precision --format png", "only --work-precision draws a picture"),
+    ] {
+        let output = curvelax(home.path(), arguments);
+        let words = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && words.contains(said), "{arguments}: {words}");
+        assert!(!home.path().join("none").exists(), "{arguments}");
+    }
+}

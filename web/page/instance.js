@@ -50,5 +50,7 @@ export class Instance {
 
   nodes(count) { return new Float32Array(this.memory.buffer, this.exports.nodes(), count).slice(); }
 
+  rests(count) { return new Float32Array(this.memory.buffer, this.exports.rests(), count).slice(); }
+
   excess(count) { return new Float64Array(this.memory.buffer, this.exports.excess(), count).slice(); }
 }

@@ -1,5 +1,6 @@
 // The page: its controls, the two workers, and what they tell.
 
+import { Film } from "./film.js";
 import { Instance } from "./instance.js";
 import { pad, show } from "./pad.js";
 import * as address from "./state.js";
@@ -7,6 +8,8 @@ import { Tiles } from "./tiles.js";
 
 /** Milliseconds between two drawings of the charts, and after the last change of a control until a run starts. */
 const CHARTS = 400, PAUSE = 400;
+/** Milliseconds in which a run is shown again. */
+const REPLAY = 5000;
 /** Charts are as wide as there is room, and readable. */
 const SIZE = "svg { display: block; width: 100%; min-width: 21rem; height: auto }";
 /** Outlines that come with the page. */
@@ -19,8 +22,8 @@ const still = matchMedia("(prefers-reduced-motion: reduce)");
 /** The number of the last run: one that still waits for its file gives way to a later one. */
 let compiled, library, dropped = null, later = 0, last = 0;
 const sides = {
-  cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), says: $("cpu-says") },
-  gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), says: $("gpu-says") },
+  cpu: { label: "CPU, f64", tiles: new Tiles($("cpu"), "--cpu"), film: new Film(), says: $("cpu-says") },
+  gpu: { label: "GPU, f32", tiles: new Tiles($("gpu"), "--gpu"), film: new Film(), says: $("gpu-says") },
 };
 
 /** Says something in the line that screen readers announce. */
@@ -31,13 +34,22 @@ function say(words, wrong = false) {
 
 // ---- settings
 
+/** Lets ε go as far as the library allows with so many waves. */
+function bound() {
+  const { eps } = library.ask({ ask: "strongest", waves: state.waves });
+  $("eps").max = eps;
+  $("strongest").textContent = `1/(M² - 1) = ${(1 / (state.waves ** 2 - 1)).toFixed(4)}`;
+}
+
 function controls() {
+  if (![...$("waves").options].some((option) => option.value === `${state.waves}`)) state.waves = address.DEFAULTS.waves;
+  bound();
   for (const key of Object.keys(address.DEFAULTS).filter((key) => key !== "points")) $(key).value = state[key];
   $("points").value = address.decoded(state.points);
   // What the controls show is what runs.
   for (const control of document.querySelectorAll("#settings select, #settings input[type=range]")) {
     if (control.value === "") control.value = address.DEFAULTS[control.id];
-    state[control.id] = control.type === "range" ? control.valueAsNumber : control.value;
+    state[control.id] = typeof address.DEFAULTS[control.id] === "number" ? Number(control.value) : control.value;
   }
   shown();
 }
@@ -47,6 +59,7 @@ function shown() {
   document.querySelectorAll("output").forEach((output) => { output.value = $(output.htmlFor.value).value; });
   document.querySelectorAll("[data-shape]").forEach((part) => { part.hidden = part.dataset.shape !== state.shape; });
   document.querySelectorAll("[data-flow]").forEach((part) => { part.hidden = part.dataset.flow !== state.flow; });
+  $("crystal").hidden = state.flow !== "surface-diffusion" || !(state.eps > 0);
   show($("pad"), address.pointsOf($("points").value));
 }
 
@@ -81,22 +94,43 @@ function offer(outline) {
 
 /** The chosen settings as the library takes them. */
 function settings(chosen, outline) {
-  const { shape, aspect, petals, flow, lambda, steps, amplitude, n, curves, seed } = chosen;
+  const { shape, aspect, petals, flow, lambda, waves, eps, steps, amplitude, n, curves, seed } = chosen;
   const shapes = { ellipse: `ellipse:${aspect},1`, circle: "circle:1", flower: `flower:${petals}:0.3` };
   return {
     shape: outline ? `file:${outline.name}` : shapes[shape] ?? shape,
     flow: flow === "elastic" ? `elastic:${lambda}` : flow,
+    energy: flow === "surface-diffusion" && eps > 0 ? `cos:${waves},${eps}` : null,
     amplitude, n, curves, seed, adaptive: steps !== "fixed",
   };
 }
 
-// ---- a run
+// ---- a run, and once more
+
+/** The share of the run that is shown: the latest frame, unless a replay has begun at a time or one has chosen another. */
+const shownAt = { share: 1, since: null };
+
+/** Shows a share of the run. */
+function showAt(share) {
+  shownAt.share = share;
+  $("moment").value = share;
+  for (const side of Object.values(sides)) side.drawn = false;
+}
+
+function replay() {
+  Object.assign(shownAt, { share: 0, since: performance.now() });
+}
+
+/** Offers to see what has moved once more. */
+function offerReplay() {
+  $("again").hidden = !Object.values(sides).some((side) => side.film.moves);
+}
 
 function stop() {
   clearTimeout(later);
   last += 1;
   for (const side of Object.values(sides)) side.worker?.terminate();
   $("stop").disabled = true;
+  offerReplay();
 }
 
 async function run() {
@@ -123,9 +157,12 @@ async function run() {
     return;
   }
   $("difference").textContent = "";
+  $("again").hidden = true;
+  Object.assign(shownAt, { share: 1, since: null });
+  $("moment").value = 1;
   $("members").tBodies[0].replaceChildren();
   for (const [place, side] of Object.entries(sides)) {
-    Object.assign(side, { begins: null, frame: null, rows: new Map(), over: false, drawn: true });
+    Object.assign(side, { begins: null, frame: null, film: new Film(), rows: new Map(), over: false, drawn: true });
     side.tiles.clear();
     side.tiles.canvas.hidden = false;
     side.says.textContent = "starts …";
@@ -155,6 +192,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
     side.begins = begins;
   } else if (frame) {
     frame.ended.forEach((row) => side.rows.set(row.member, row));
+    side.film.add({ nodes: frame.nodes, done: frame.done });
     Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
     const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
     side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
@@ -165,6 +203,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
 
 function finish() {
   $("stop").disabled = true;
+  offerReplay();
   draw.charted = -Infinity;
   compare();
   const { cpu } = sides;
@@ -180,8 +219,13 @@ function finish() {
 function draw(now) {
   requestAnimationFrame(draw);
   const running = Object.values(sides).filter((side) => side.frame);
+  if (shownAt.since !== null) {
+    showAt(Math.min(1, (now - shownAt.since) / REPLAY));
+    if (shownAt.share === 1) shownAt.since = null;
+  }
   for (const side of running.filter((side) => !side.drawn)) {
-    side.tiles.draw(side.frame.nodes, side.begins.n, side.rows);
+    const { nodes, done } = side.film.at(shownAt.share);
+    side.tiles.draw(nodes, side.film.start.nodes, side.frame.rests, side.begins.n, new Set([...side.rows.keys()].slice(0, done)));
     [side.drawn, draw.isStale] = [true, true];
   }
   // At the start there is no line to draw.
@@ -250,11 +294,15 @@ function rows() {
 function changed({ target }) {
   if (!(target.id in address.DEFAULTS)) return;
   const isNumber = typeof address.DEFAULTS[target.id] === "number";
-  const value = isNumber ? target.valueAsNumber : target.value;
+  const value = isNumber ? Number(target.value || NaN) : target.value;
   if (isNumber && !address.holds(target.id, value)) {
     return say(`${target.labels[0].textContent}: give a whole number from 0 to ${Number.MAX_SAFE_INTEGER}.`, true);
   }
   state[target.id] = target.id === "points" ? address.coded(value) : value;
+  if (target.id === "waves") {
+    bound();
+    state.eps = $("eps").valueAsNumber;
+  }
   address.write(state);
   shown();
   again();
@@ -292,6 +340,11 @@ async function begin() {
   $("settings").addEventListener("input", changed);
   $("settings").addEventListener("submit", (event) => { event.preventDefault(); run(); });
   $("stop").addEventListener("click", () => { stop(); say("Stopped."); $("run").focus(); });
+  $("replay").addEventListener("click", replay);
+  $("moment").addEventListener("input", ({ target }) => {
+    shownAt.since = null;
+    showAt(target.valueAsNumber);
+  });
   $("copy").addEventListener("click", () =>
     navigator.clipboard.writeText($("command").textContent).then(() => say("Copied."), () => say("Not copied.", true)));
   $("file").addEventListener("change", ({ target }) => take(target.files[0]));

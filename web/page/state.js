@@ -1,12 +1,12 @@
 // The settings of the page, in the fragment of its address.
 
 export const DEFAULTS = {
-  shape: "ellipse", aspect: 2, petals: 3, flow: "surface-diffusion", lambda: 0.5, steps: "adaptive",
+  shape: "ellipse", aspect: 2, petals: 3, flow: "surface-diffusion", lambda: 0.5, waves: 4, eps: 0, steps: "adaptive",
   amplitude: 0.05, n: 100, curves: 100, seed: 1, points: "",
 };
 
 /** Numbers that are counts. */
-const WHOLE = ["petals", "n", "curves", "seed"];
+const WHOLE = ["petals", "waves", "n", "curves", "seed"];
 
 /** Points in the unit square as text: two digits of base 36 each for x and y. */
 function packed(points) {

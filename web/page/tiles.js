@@ -1,51 +1,63 @@
-// The members of a run, each in a tile of its own.
+// The members of a run, each in a tile of its own, in front of its outline at the start and of its Wulff shape.
 
 export class Tiles {
   /** Tiles on `canvas` in the colour of this name. */
   constructor(canvas, colour) {
-    Object.assign(this, { canvas, colour, frames: null });
+    Object.assign(this, { canvas, colour });
   }
 
   clear() {
-    this.frames = null;
     const { canvas } = this;
     canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   }
 
-  /** Draws all members from their nodes, x and y of each; those that have ended are filled. */
-  draw(nodes, n, ended) {
+  /**
+   * Draws all members from their nodes, x and y of each, now and at the start; those that have ended are filled.
+   * `rests` has a Wulff shape for each, or is empty.
+   */
+  draw(nodes, start, rests, n, ended) {
     const { canvas } = this, members = nodes.length / (2 * n);
     const pixels = (size) => Math.round(size * devicePixelRatio);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map(pixels);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    this.frames ??= new Array(members).fill(null);
     let columns = 1;
     while (Math.floor(height / (width / columns)) * columns < members) columns++;
     const tile = width / columns, context = canvas.getContext("2d"), style = getComputedStyle(canvas);
-    const paths = [new Path2D(), new Path2D()];
+    const [before, rest, moving, over] = [0, 1, 2, 3].map(() => new Path2D());
     for (let member = 0; member < members; member++) {
-      const own = nodes.subarray(2 * n * member, 2 * n * (member + 1));
-      if (Number.isNaN(own[0])) continue;
-      // A curve keeps the scale of its first frame, so that one sees it grow or shrink.
-      const [x, y, size] = (this.frames[member] ??= frame(own));
-      const scale = (0.42 * tile) / size, path = paths[ended.has(member) ? 1 : 0];
+      const of = (all) => all.subarray(all.length / members * member, all.length / members * (member + 1));
+      const [now, first] = [of(nodes), of(start)];
+      if (Number.isNaN(now[0]) || Number.isNaN(first[0])) continue;
+      // A curve keeps the scale of its start, so that one sees it grow or shrink.
+      const [x, y, size] = frame(first), scale = (0.42 * tile) / size;
       const [left, top] = [((member % columns) + 0.5) * tile, (Math.floor(member / columns) + 0.5) * tile];
-      for (let i = 0; i < own.length; i += 2) {
-        path[i ? "lineTo" : "moveTo"](left + (own[i] - x) * scale, top - (own[i + 1] - y) * scale);
-      }
-      path.closePath();
+      const add = (path, points) => {
+        for (let i = 0; i < points.length; i += 2) {
+          path[i ? "lineTo" : "moveTo"](left + (points[i] - x) * scale, top - (points[i + 1] - y) * scale);
+        }
+        path.closePath();
+      };
+      add(before, first);
+      if (rests.length) add(rest, of(rests));
+      add(ended.has(member) ? over : moving, now);
     }
     context.clearRect(0, 0, width, height);
     context.lineJoin = "round";
-    context.strokeStyle = context.fillStyle = style.getPropertyValue(this.colour);
-    paths.forEach((path, i) => {
-      context.lineWidth = (i ? 1 : 1.5) * devicePixelRatio;
-      context.globalAlpha = i ? 0.25 : 0.08;
-      context.fill(path);
-      context.globalAlpha = i ? 0.5 : 1;
+    const stroke = (path, colour, line) => {
+      context.strokeStyle = style.getPropertyValue(colour);
+      context.lineWidth = line * devicePixelRatio;
       context.stroke(path);
-    });
+    };
+    context.fillStyle = style.getPropertyValue(this.colour);
+    context.globalAlpha = 0.2;
+    context.fill(over);
     context.globalAlpha = 1;
+    stroke(before, "--start", 1);
+    context.setLineDash([4, 3].map((part) => part * devicePixelRatio));
+    stroke(rest, "--rest", 1.5);
+    context.setLineDash([]);
+    stroke(over, this.colour, 1.5);
+    stroke(moving, this.colour, 1.5);
   }
 }
 

@@ -26,7 +26,8 @@ async function run(compiled, settings, file, place) {
     if (turn.frame) {
       const frame = instance.ask({ ask: "frame" });
       const [nodes, excess] = [instance.nodes(2 * members * n), instance.excess(members * times.length)];
-      postMessage({ frame: { ...frame, nodes, excess } }, [nodes.buffer, excess.buffer]);
+      const rests = instance.rests(frame.rests);
+      postMessage({ frame: { ...frame, nodes, excess, rests } }, [nodes.buffer, excess.buffer, rests.buffer]);
     }
     if (!turn.dispatch) continue;
     if (!kernel) {

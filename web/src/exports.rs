@@ -51,6 +51,12 @@ pub extern "C" fn nodes() -> *const f32 {
     INSTANCE.with_borrow(|instance| instance.run.as_ref().map_or(std::ptr::null(), |run| run.nodes().as_ptr()))
 }
 
+/// Where the Wulff shapes of the last frame are: for each member x and y of each node, in f32; NaN if not known.
+#[unsafe(no_mangle)]
+pub extern "C" fn rests() -> *const f32 {
+    INSTANCE.with_borrow(|instance| instance.run.as_ref().map_or(std::ptr::null(), |run| run.rests().as_ptr()))
+}
+
 /// Where the excess of each member at each time of the grid is, in f64; NaN if not known.
 #[unsafe(no_mangle)]
 pub extern "C" fn excess() -> *const f64 {

@@ -22,6 +22,8 @@ use settings::Settings;
 enum Request {
     /// Whether these settings can be run, and the command that does the same.
     Check { settings: Settings },
+    /// The strongest anisotropy of so many waves.
+    Strongest { waves: u32 },
     /// Starts a run.
     Start { settings: Settings, place: Place },
     /// Takes a turn of the run.
@@ -49,6 +51,7 @@ impl Instance {
         let none = "no run has been started";
         match request {
             Request::Check { settings } => settings.check(),
+            Request::Strongest { waves } => Ok(json!({ "eps": settings::strongest(waves) })),
             Request::Start { settings, place } => {
                 let (run, answer) = Run::start(&settings, place)?;
                 self.run = Some(run);

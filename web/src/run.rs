@@ -10,12 +10,14 @@ use curvelax_backend::{
 use curvelax_curve::polygon;
 use curvelax_ensemble::{
     Cell, Ended, Sink, Standing, Study,
+    outcome::wulff_outline,
     request::spec::Precision,
     schedule::grid,
     simulate::{Roster, Simulation},
     trajectory::Placing,
 };
 use curvelax_flow::{
+    equilibrium::Equilibrium,
     scheme::{
         Parameters, State, extrapolation,
         member::{Counters, Report},
@@ -24,6 +26,7 @@ use curvelax_flow::{
     },
     solver::Blocks,
 };
+use glam::DVec2;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -74,6 +77,8 @@ pub struct Run {
     goes_on: bool,
     nodes: Vec<f32>,
     excess: Vec<f64>,
+    /// For each member of a crystal the Wulff shape of its first state, or of its last one.
+    rests: Vec<f32>,
     times: Vec<f64>,
     /// For each member the time at which it relaxed, or until which it has not.
     relaxed: Vec<(f64, bool)>,
@@ -131,6 +136,7 @@ impl Run {
             goes_on: true,
             nodes: vec![f32::NAN; 2 * members * spec.points],
             excess: vec![f64::NAN; members * times.len()],
+            rests: Vec::new(),
             relaxed: vec![(0.0, false); members],
             areas: vec![None; members],
             times,
@@ -175,15 +181,19 @@ impl Run {
             self.relaxed[member as usize] = (trajectory.now(), false);
         }
         excesses.into_iter().for_each(|(member, excess)| self.note(member, &excess));
+        let new: Vec<Ended> = self.ended[self.told..].to_vec();
+        let over: Vec<u64> = new.iter().map(|ended| ended.outcome.member).collect();
         for (member, placing, state) in shown {
             let first = 2 * member as usize * n;
             let nodes = placing.nodes(&state);
+            if self.areas[member as usize].is_none() || over.contains(&member) {
+                self.note_rest(member as usize, &nodes);
+            }
             self.areas[member as usize].get_or_insert_with(|| polygon::signed_area(&nodes));
             for (to, node) in self.nodes[first..first + 2 * n].chunks_exact_mut(2).zip(nodes) {
                 to.copy_from_slice(&[node.x as f32, node.y as f32]);
             }
         }
-        let new: Vec<Ended> = self.ended[self.told..].to_vec();
         for ended in &new {
             let (member, outcome) = (ended.outcome.member as usize, &ended.outcome);
             self.note(member, &ended.excess);
@@ -194,10 +204,22 @@ impl Run {
             "ended": new.iter().map(|ended| self.row(ended)).collect::<Vec<_>>(),
             "done": self.ended.len(),
             "goesOn": self.goes_on,
+            "rests": self.rests.len(),
             "mean": self.mean(),
             "times": self.relaxed,
             "area": self.areas.iter().flatten().sum::<f64>() / self.areas.iter().flatten().count() as f64,
         }))
+    }
+
+    /// Notes the Wulff shape of the area and the centroid of a member, if it is a crystal.
+    fn note_rest(&mut self, member: usize, nodes: &[DVec2]) {
+        let Equilibrium::Wulff(energy) = self.cell.spec.typical().flow.equilibrium() else { return };
+        let shape = wulff_outline(nodes, &energy);
+        self.rests.resize(2 * shape.len() * self.relaxed.len(), f32::NAN);
+        let own = &mut self.rests[2 * shape.len() * member..][..2 * shape.len()];
+        for (to, node) in own.chunks_exact_mut(2).zip(shape) {
+            to.copy_from_slice(&[node.x as f32, node.y as f32]);
+        }
     }
 
     fn note(&mut self, member: usize, excess: &[f64]) {
@@ -236,6 +258,11 @@ impl Run {
     /// The nodes of the last frame.
     pub fn nodes(&self) -> &[f32] {
         &self.nodes
+    }
+
+    /// The Wulff shapes of all members, each a polygon of as many nodes; empty unless they are crystals.
+    pub fn rests(&self) -> &[f32] {
+        &self.rests
     }
 
     /// The excess of all members at all times of the grid.

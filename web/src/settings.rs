@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use curvelax_ensemble::{Spec, Study};
+use curvelax_flow::crystal::Energy;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -16,12 +17,24 @@ const LARGER: u64 = 10_000;
 const ADAPTIVE: [(&str, &str); 5] =
     [("adaptive", "1e-3"), ("pull", "auto"), ("omega", "auto"), ("t-end", "auto"), ("stop-when-relaxed", "true")];
 
+/// The steps of the slider of anisotropies.
+const FINEST_EPS: f64 = 1e-3;
+
+/// The largest EPS of the slider for so many waves: the next one is refused, since the equation would be ill-posed.
+pub fn strongest(waves: u32) -> f64 {
+    let allowed = |eps: &f64| format!("cos:{waves},{eps:.3}").parse::<Energy>().is_ok();
+    (0..1000).map(|i| f64::from(i) * FINEST_EPS).take_while(allowed).last().unwrap_or_default()
+}
+
 /// The settings of the page. Text is checked by the spec.
 #[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     shape: String,
     flow: String,
+    /// The surface energy of a crystal, if it is not the same in all directions.
+    #[serde(default)]
+    energy: Option<String>,
     amplitude: f64,
     n: u64,
     curves: u64,
@@ -36,15 +49,15 @@ impl Settings {
     /// The keys and values of the spec; values are TOML.
     fn keys(&self) -> Vec<(&'static str, String)> {
         let text = |value: &str| Value::from(value).to_string();
-        let Settings { shape, flow, amplitude, n, curves, seed, adaptive, precision } = self;
-        let mut keys = vec![
-            ("shape", text(shape)),
-            ("flow", text(flow)),
+        let Settings { shape, flow, energy, amplitude, n, curves, seed, adaptive, precision } = self;
+        let mut keys = vec![("shape", text(shape)), ("flow", text(flow))];
+        keys.extend(energy.iter().map(|energy| ("energy", text(energy))));
+        keys.extend([
             ("amplitude", format!("{amplitude:?}")),
             ("points", n.to_string()),
             ("curves", curves.to_string()),
             ("seed", seed.to_string()),
-        ];
+        ]);
         if *adaptive {
             let word = |value: &str| if value == "auto" { text(value) } else { value.to_string() };
             keys.extend(ADAPTIVE.map(|(key, value)| (key, word(value))));

@@ -95,23 +95,35 @@ impl PlottedCurve {
 
 impl Plot {
     /// The text of an SVG file: equal plots give equal bytes.
-    pub fn draw(&self) -> String {
-        let frame = Frame::new(&self.panels);
+    pub fn draw(&self, medium: Medium) -> String {
+        let (most, least, head) = match medium {
+            Medium::Screen => (MAX_WIDTH, MIN_WIDTH, HEAD),
+            // Title and sentence belong into the caption.
+            Medium::Paper(width) => (width - LEFT - RIGHT, width, RIGHT),
+        };
+        let frame = Frame::new(&self.panels, most);
         let most_curves = self.panels.iter().map(|panel| panel.curves.len()).max().unwrap_or(0);
-        let legend = if most_curves > 1 { LEGEND } else { 0.0 };
+        let entries = match medium {
+            Medium::Screen => most_curves,
+            Medium::Paper(width) => (((width - 2.0 * RIGHT) / ENTRY) as usize).max(1),
+        };
+        let lines = most_curves.div_ceil(entries.max(1)) as f64;
+        let legend = if most_curves > 1 { LEGEND * lines } else { 0.0 };
         let heading = if self.panels.iter().any(|panel| panel.heading.is_some()) { HEADING } else { 0.0 };
         let count = self.panels.len().max(1) as f64;
         let panels_width = count * (frame.size.x + GAP) - GAP;
-        let width = (LEFT + panels_width + RIGHT).max(MIN_WIDTH);
-        let top = HEAD + legend + heading;
+        let width = (LEFT + panels_width + RIGHT).max(least);
+        let top = head + legend + heading;
         let left = 0.5 * (width - panels_width + LEFT - RIGHT);
 
-        let mut svg = Svg::new(width, top + frame.size.y + FOOT, &sheet(Medium::Screen, LIGHT, DARK), &self.title);
+        let mut svg = Svg::new(width, top + frame.size.y + FOOT, &sheet(medium, LIGHT, DARK), &self.title);
         svg.rectangle("back", DVec2::ZERO, DVec2::new(width, top + frame.size.y + FOOT), 0.0);
-        svg.text("head", DVec2::new(RIGHT, 26.0), &self.title);
-        svg.text("note", DVec2::new(RIGHT, 46.0), &self.subtitle);
+        if medium.is_screen() {
+            svg.text("head", DVec2::new(RIGHT, 26.0), &self.title);
+            svg.text("note", DVec2::new(RIGHT, 46.0), &self.subtitle);
+        }
         if let Some(panel) = self.panels.iter().find(|panel| legend > 0.0 && panel.curves.len() == most_curves) {
-            draw_legend(&mut svg, panel, DVec2::new(RIGHT, HEAD + 12.0));
+            draw_legend(&mut svg, panel, DVec2::new(RIGHT, head + 12.0), entries);
         }
         for (i, panel) in self.panels.iter().enumerate() {
             let corner = DVec2::new(left + i as f64 * (frame.size.x + GAP), top);
@@ -121,9 +133,9 @@ impl Plot {
     }
 }
 
-fn draw_legend(svg: &mut Svg, panel: &PlotPanel, left: DVec2) {
+fn draw_legend(svg: &mut Svg, panel: &PlotPanel, left: DVec2, entries: usize) {
     for (i, curve) in panel.curves.iter().enumerate() {
-        let at = left + DVec2::new(i as f64 * ENTRY, 0.0);
+        let at = left + DVec2::new((i % entries) as f64 * ENTRY, (i / entries) as f64 * LEGEND);
         svg.open(&colour(i));
         svg.path("line", &format!("M{} {}h24", coordinate(at.x), coordinate(at.y)));
         svg.path("nodes", &dots(&[at + DVec2::new(4.0, 0.0), at + DVec2::new(20.0, 0.0)]));
@@ -149,8 +161,8 @@ struct Frame {
 }
 
 impl Frame {
-    /// The smallest frame for all curves.
-    fn new(panels: &[PlotPanel]) -> Frame {
+    /// The smallest frame for all curves, in panels that are together at most so wide.
+    fn new(panels: &[PlotPanel], width: f64) -> Frame {
         let nodes = || panels.iter().flat_map(|panel| &panel.curves).flat_map(|curve| curve.nodes.iter().copied());
         let low = nodes().reduce(DVec2::min).unwrap_or(DVec2::ZERO);
         let high = nodes().reduce(DVec2::max).unwrap_or(DVec2::ONE);
@@ -158,7 +170,7 @@ impl Frame {
         let room = DVec2::splat(if largest > 0.0 { PADDING * largest } else { 1.0 });
         let (low, high) = (low - room, high + room);
         let count = panels.len().max(1) as f64;
-        let most = DVec2::new((MAX_WIDTH - (count - 1.0) * GAP) / count, MAX_HEIGHT);
+        let most = DVec2::new((width - (count - 1.0) * GAP) / count, MAX_HEIGHT);
         let scale = (most / (high - low)).min_element();
         Frame { low, high, scale, size: (high - low) * scale, step: tick_step(MIN_TICK / scale) }
     }
@@ -233,10 +245,10 @@ mod tests {
     fn the_frame_holds_the_largest_curve_whatever_its_size() {
         for (width, height) in [(4.0, 2.0), (1e-6, 3e-6), (1e9, 1.0), (0.0, 0.0)] {
             let plot = plot(&[&[rectangle(width, height), rectangle(0.5 * width, 0.5 * height)]]);
-            let frame = Frame::new(&plot.panels);
+            let frame = Frame::new(&plot.panels, MAX_WIDTH);
             assert!(frame.size.x < MAX_WIDTH + 1e-9 && frame.size.y < MAX_HEIGHT + 1e-9);
             assert!(frame.high.x > 0.5 * width && frame.high.y > 0.5 * height);
-            let text = plot.draw();
+            let text = plot.draw(Medium::Screen);
             assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
             assert!(text.matches("class=\"x tick").count() >= 1, "{text}");
         }
@@ -250,7 +262,7 @@ mod tests {
     #[test]
     fn a_legend_is_there_where_a_panel_has_several_curves() {
         let one = rectangle(1.0, 1.0);
-        assert_eq!(plot(&[from_ref(&one), from_ref(&one)]).draw().matches("class=\"label\"").count(), 0);
-        assert_eq!(plot(&[&[one.clone(), one]]).draw().matches("class=\"label\"").count(), 2);
+        assert_eq!(plot(&[from_ref(&one), from_ref(&one)]).draw(Medium::Screen).matches("class=\"label\"").count(), 0);
+        assert_eq!(plot(&[&[one.clone(), one]]).draw(Medium::Screen).matches("class=\"label\"").count(), 2);
     }
 }

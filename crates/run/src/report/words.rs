@@ -151,6 +151,14 @@ pub fn member_name(spec: &Spec, member: &MemberTime) -> String {
     if name.is_empty() { format!("member {}", member.member) } else { name }
 }
 
+/// What the clock of moving members shows if their relaxation times are limits.
+pub const RAW_CLOCK: &str = "t is raw, at the nodes of the run";
+
+/// The limit of a member behind its status.
+pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
+    format!(", t_limit = {}{unit}", curvelax_base::text::significant(t_limit, 4))
+}
+
 /// The time of a member with its error, or until when it had not relaxed.
 pub fn member_time(member: &MemberTime) -> String {
     match member.shown() {

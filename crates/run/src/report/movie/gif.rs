@@ -78,9 +78,10 @@ impl Movie {
     /// What does not move.
     fn still(&self) -> Option<Raster> {
         let mut picture = Raster::new(self.size.x as u32, self.size.y as u32)?;
-        let head = DVec2::new(self.size.x - MARGIN - (GREY.len() * Letters::Small.advance()) as f64, 28.0);
-        if head.x > 0.5 * self.size.x {
-            picture.text(head, GREY, INK, Letters::Small);
+        let words = self.head();
+        let head = DVec2::new(self.size.x - MARGIN - (words.len() * Letters::Small.advance()) as f64, 28.0);
+        if head.x > 0.5 * self.size.x || words != GREY {
+            picture.text(head, &words, INK, Letters::Small);
         }
         for panel in &self.panels {
             let (low, high) = (panel.corner + 0.5, panel.corner + self.frame - 0.5);

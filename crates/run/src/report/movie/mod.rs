@@ -15,7 +15,11 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::{gallery::common_extent, page::spread};
+use super::{
+    gallery::common_extent,
+    page::spread,
+    words::{RAW_CLOCK, in_the_limit},
+};
 use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
 use curvelax_draw::axis::tick_step;
@@ -83,6 +87,8 @@ pub struct Movie {
     bar: Option<(f64, String)>,
     /// The unit of time; empty if it has no name.
     unit: String,
+    /// Whether members have limits, which the clock does not show.
+    is_raw: bool,
 }
 
 /// A member with its place.
@@ -99,8 +105,8 @@ struct MoviePanel {
 
 impl Movie {
     /// The members to watch, the first ones or some of all cells, as `cut` requests it; none if no film has a state
-    /// to draw.
-    pub fn new(films: &[Film], spec: &Spec, cut: &Cut) -> Option<Movie> {
+    /// to draw. `t_limit` knows the limit of a member, if it has one.
+    pub fn new(films: &[Film], spec: &Spec, cut: &Cut, t_limit: impl Fn(u64) -> Option<f64>) -> Option<Movie> {
         let shown = if spec.sweep.is_empty() { films.len().min(cut.members) } else { films.len() };
         let films: Vec<&Film> = spread(shown, cut.members).map(|i| &films[i]).collect();
         let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
@@ -137,6 +143,8 @@ impl Movie {
         let pitch = frame + DVec2::new(GAP, lines * LINE + BELOW);
         let rows = films.len().div_ceil(columns);
 
+        let time_unit = spec.units.as_ref().map(|units| units.shown().time);
+        let is_raw = films.iter().any(|film| t_limit(film.member).is_some());
         let panels = films.iter().zip(states).zip(boxes).enumerate().map(|(i, ((film, states), bounds))| {
             let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
             let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
@@ -146,9 +154,11 @@ impl Movie {
             let pixel = |p: DVec2| corner + 0.5 * frame + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
             let moved = states.into_iter().map(|nodes| nodes.into_iter().map(pixel).collect());
             let frames = film.times.iter().copied().zip(moved).collect();
-            let end = match film.t_relax {
-                Some(t) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
-                None => (film.times.last().copied().unwrap_or_default(), film.status.name().into()),
+            let unit = time_unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
+            let end = match (film.t_relax, t_limit(film.member)) {
+                (Some(t), Some(limit)) => (t, film.status.name().to_string() + &in_the_limit(limit, &unit)),
+                (Some(t), None) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
+                (None, _) => (film.times.last().copied().unwrap_or_default(), film.status.name().into()),
             };
             let names = names(film, high - low);
             MoviePanel { member: MovedMember::new(film.status, frames), corner, names, end }
@@ -168,7 +178,8 @@ impl Movie {
             size: DVec2::new(width, HEAD + rows as f64 * pitch.y + FOOT),
             frame,
             bar,
-            unit: spec.units.as_ref().map_or(String::new(), |units| units.shown().time),
+            unit: time_unit.unwrap_or_default(),
+            is_raw,
         })
     }
 
@@ -196,6 +207,14 @@ impl Movie {
         clock
     }
 
+    /// What the head says at its right: of the clock, if there is room, and of the grey line.
+    fn head(&self) -> String {
+        match self.is_raw && self.size.x >= WIDE {
+            true => format!("{RAW_CLOCK}; {GREY}"),
+            false => GREY.into(),
+        }
+    }
+
     /// Left end of the bar of the scale, or of what is said instead.
     fn foot(&self) -> DVec2 {
         DVec2::new(MARGIN, self.size.y - 16.0)
@@ -212,6 +231,9 @@ impl Movie {
         panel.corner + DVec2::new(0.5 * self.frame.x, self.frame.y + LINE * (1.0 + i as f64))
     }
 }
+
+/// Width from which the head has room for a sentence.
+const WIDE: f64 = 560.0;
 
 /// What the head says of the grey line.
 const GREY: &str = "grey: start";
@@ -244,7 +266,7 @@ pub(super) mod tests {
         let status = |member| if member % 3 == 1 { Status::Unfinished } else { Status::Relaxed };
         let t_relax = |member| (status(member) == Status::Relaxed).then_some(0.4 + 0.1 * member as f64);
         let films: Vec<Film> = (0..count).map(|member| film(member, 60, status(member), t_relax(member))).collect();
-        Movie::new(&films, &Spec::default(), &Cut { width, ..CUT }).unwrap()
+        Movie::new(&films, &Spec::default(), &Cut { width, ..CUT }, |_| None).unwrap()
     }
 
     #[test]
@@ -291,6 +313,23 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn a_limit_is_told_in_the_words_of_the_report_and_the_clock_is_raw() {
+        let films: Vec<Film> = (0..3).map(|member| film(member, 60, Status::Relaxed, Some(0.5))).collect();
+        let cut = |width| Cut { width, ..CUT };
+        let movie =
+            |width, limit: fn(u64) -> Option<f64>| Movie::new(&films, &Spec::default(), &cut(width), limit).unwrap();
+        let wide = movie(800, |member| (member != 1).then_some(0.51234));
+        let ends: Vec<&str> = wide.panels.iter().map(|panel| &*panel.end.1).collect();
+        assert_eq!(ends, ["relaxed, t_limit = 0.5123", "relaxed at t = 0.5", "relaxed, t_limit = 0.5123"]);
+        // The moment is that of what moves.
+        assert_eq!(wide.panels[0].end.0, 0.5);
+        assert_eq!(wide.head(), "t is raw, at the nodes of the run; grey: start");
+        assert!(wide.svg().contains(&wide.head()));
+        assert_eq!(movie(400, |_| Some(0.5)).head(), "grey: start");
+        assert_eq!(movie(800, |_| None).head(), "grey: start");
+    }
+
+    #[test]
     fn a_member_without_a_state_has_an_empty_panel_and_none_at_all_make_no_movie() {
         use curvelax_ensemble::Portrait;
         use curvelax_study::samples::outcome;
@@ -298,11 +337,11 @@ pub(super) mod tests {
         let gone = Portrait { before: nan.clone(), frames: vec![], after: nan };
         let gone = Film::new(&outcome(1, Status::Nonfinite, None), &gone);
         let good = film(0, 60, Status::Relaxed, Some(0.5));
-        let movie = Movie::new(&[good, gone.clone()], &Spec::default(), &CUT).unwrap();
+        let movie = Movie::new(&[good, gone.clone()], &Spec::default(), &CUT, |_| None).unwrap();
         assert_eq!(movie.panels.len(), 2);
         assert_eq!((movie.panels[1].member.at(0.1), &*movie.panels[1].end.1), (vec![], "nonfinite"));
-        assert_eq!(Movie::new(&[gone], &Spec::default(), &CUT), None);
-        assert_eq!(Movie::new(&[], &Spec::default(), &CUT), None);
+        assert_eq!(Movie::new(&[gone], &Spec::default(), &CUT, |_| None), None);
+        assert_eq!(Movie::new(&[], &Spec::default(), &CUT, |_| None), None);
     }
 
     #[test]
@@ -312,7 +351,7 @@ pub(super) mod tests {
         let films: Vec<Film> = (0..12).map(|member| film(member, 60, Status::Relaxed, Some(0.5))).collect();
         let few = Cut { members: 3, ..CUT };
         let names = |spec: &Spec| {
-            let movie = Movie::new(&films, spec, &few).unwrap();
+            let movie = Movie::new(&films, spec, &few, |_| None).unwrap();
             movie.panels.iter().map(|panel| panel.names.join(": ")).collect::<Vec<_>>()
         };
         assert_eq!(

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use glam::DVec2;
 
-use super::{GREY, HOLD, MARGIN, Movie, MoviePanel, gif::INSIDE};
+use super::{HOLD, MARGIN, Movie, MoviePanel, gif::INSIDE};
 use crate::report::gallery::{self, OWN_SCALES};
 use curvelax_draw::{
     medium::Medium,
@@ -37,7 +37,7 @@ impl Movie {
         let mut svg = Svg::new(self.size.x, self.size.y, &style, "Members during relaxation");
         svg.rectangle("back", DVec2::ZERO, self.size, 0.0);
         if self.size.x > 300.0 {
-            svg.text("note end", DVec2::new(self.size.x - MARGIN, 28.0), GREY);
+            svg.text("note end", DVec2::new(self.size.x - MARGIN, 28.0), &self.head());
         }
         self.clock_in(&mut svg);
         self.panels.iter().for_each(|panel| self.panel(&mut svg, panel));

@@ -50,6 +50,8 @@ pub struct Page<'a> {
     pub warnings: &'a [String],
     /// A few members to watch; the first [`MAX_MEMBERS`] are shown.
     pub members: Vec<MovingMember>,
+    /// What the clock of the members shows, if that needs a word.
+    pub clock: &'a str,
     /// Units of length and time, each after a space; may be empty.
     pub units: [String; 2],
     /// The legend of all pictures.
@@ -148,7 +150,10 @@ impl Page<'_> {
         html += &section("What went wrong", "wrong", &self.wrong());
         html += "</div>\n";
         if let Some(player) = player {
-            html += &format!("<div>\n{}</div>\n", section("Members on their way", "", &player.html()));
+            html += &format!(
+                "<div>\n{}</div>\n",
+                section("Members on their way", "", &(player.html() + &paragraph("note", self.clock)))
+            );
         }
         html + "</div>\n"
     }

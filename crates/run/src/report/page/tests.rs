@@ -68,6 +68,7 @@ fn page(warnings: &[String]) -> Page<'_> {
     let headline =
         headline.map(|(label, value, note)| Headline { label: label.into(), value: value.into(), note: note.into() });
     Page {
+        clock: "",
         title: "4096 perturbed ellipses under surface diffusion",
         what: "8 amplitudes from 0.01 to 0.2, 512 members each: ellipse:2,1, n = 100, adaptive 0.0001, t-end = 2, seed 1.",
         statuses: vec![("relaxed", 3996), ("unfinished", 88), ("singular", 4), ("nonfinite", 0), ("stalled", 8)],
@@ -165,6 +166,7 @@ fn everything_is_escaped() {
     let warnings = [evil.to_owned()];
     let owned = || evil.to_owned();
     let html = Page {
+        clock: "",
         title: evil,
         what: evil,
         statuses: vec![(evil, 3)],

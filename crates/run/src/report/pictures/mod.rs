@@ -8,7 +8,7 @@ mod tables;
 use super::{
     gallery::{self, Wording},
     page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
-    words::place,
+    words::{RAW_CLOCK, in_the_limit, place},
 };
 use glam::DVec2;
 
@@ -124,6 +124,7 @@ impl FinishedRun<'_> {
             headline,
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
+            clock: if self.statistics.of_limits { RAW_CLOCK } else { "" },
             units: [self.length_unit(), self.time_unit()],
             legend,
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
@@ -139,7 +140,7 @@ impl FinishedRun<'_> {
         let unit = self.time_unit();
         let raw = film.t_relax.map(|t| format!(" at t = {}{unit}", significant(t, 3)));
         let limit = self.tally.named(film.member).and_then(|member| member.t_limit);
-        limit.map(|t| format!(", t_limit = {}{unit}", significant(t, 4))).or(raw).unwrap_or_default()
+        limit.map(|t| in_the_limit(t, &unit)).or(raw).unwrap_or_default()
     }
 
     /// What is written below the portraits.
