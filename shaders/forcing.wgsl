@@ -9,9 +9,14 @@ const KEPT_AREA = 27u;
 const KEPT_LENGTH = 28u;
 /// Rounds of a correction.
 const ROUNDS = 4u;
+/// -φ of the position equation where forces act, in units of (2π/L)².
+const DAMPING = 3.0;
+const TAU = 6.283185307179586;
 
 /// F + p of this step.
 var<private> force: real;
+/// What stands for φ in the position equation where forces act.
+var<private> damping: real;
 
 /// beta with F + lambda k + p, for the old curvatures and lengths; lambda joins the law.
 fn act(k: vec, r: vec, beta: vec) -> vec {
@@ -30,6 +35,8 @@ fn act(k: vec, r: vec, beta: vec) -> vec {
     let turned = flow_turned + drive * first.y;
     let by = balanced(first, -moved, -turned);
     force = drive + by.x;
+    let around = real(TAU) / first.x;
+    damping = real(-DAMPING) * (around * around);
     multiplier = by.y;
     law.c1 += multiplier;
     return beta + (vec(force) + multiplier * k);
@@ -38,15 +45,17 @@ fn act(k: vec, r: vec, beta: vec) -> vec {
 /// Increments of x and y.
 struct Moves { x: vec, y: vec }
 
-/// Adds a time tau of the force, along the inward normals of the old curve, to the increments of x and y; moves the nodes of
+/// Adds a time tau of the force, along the inward normals of circles through the old nodes, to the increments of x and y; moves the nodes of
 /// the new curve.
 fn push(x: vec, y: vec) -> Moves {
     settle();
     let old = windows(x, y);
     let ex = rises_of_places(old.a);
     let ey = rises_of_places(old.b);
-    let along_x = ex.here + ex.plus1;
-    let along_y = ey.here + ey.plus1;
+    let ee = ex.here * ex.here + ey.here * ey.here;
+    let ff = ex.plus1 * ex.plus1 + ey.plus1 * ey.plus1;
+    let along_x = ff * ex.here + ee * ex.plus1;
+    let along_y = ff * ey.here + ee * ey.plus1;
     let across = (tau * force) / sqrt(along_x * along_x + along_y * along_y);
     let by = Moves(u - across * along_y, v + across * along_x);
     settle();

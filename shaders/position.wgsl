@@ -21,7 +21,8 @@ fn position_equation() {
     let middle = irh * iqh * irp;
     let low = irh * irh * (iqm + iqh);
     let high = irp * irp * (iqh + iqp);
-    let mean_phi = real(0.5) * (phi(kh) + phi(kp));
+    var mean_phi = vec(damping);
+    if !FORCED { mean_phi = real(0.5) * (phi(kh) + phi(kp)); }
     let drift = real(0.5) * alpha - real(0.75) * (rise_of_square(wk) * iqh);
     let row_b = (mean_phi * irh + drift) - (middle + low + row_a);
     let row_d = (mean_phi * irp - drift) - (middle + high + row_e);
@@ -63,7 +64,8 @@ fn position_of_crystal() {
     let phi_here = given.mobile * (w * kh);
     let phi_after = given.mobile_after * (wp * kp);
     let current = given.there.diffusivity * (wp - w);
-    let mean = real(0.5) * (phi_here + phi_after);
+    var mean = vec(damping);
+    if !FORCED { mean = real(0.5) * (phi_here + phi_after); }
     let turned = real(0.5) * ((kh + kp) * current) + (phi_after - phi_here);
     let drift = real(0.5) * (alpha - turned * here(iq));
     let both = at * (s + sp);

@@ -43,6 +43,7 @@ fn forget() {
     displacement = vec();
     multiplier = 0.0;
     force = 0.0;
+    damping = 0.0;
 }
 
 /// Computes the curve a time tau later, redistributed if `moves`. An odd phase means that the curvature is solved.

@@ -12,7 +12,7 @@ use curvelax::{
     number::{BIG, LN_HALVINGS, LN_TERMS, Real},
     scheme::{
         decay, dense, extrapolation,
-        forcing::ROUNDS,
+        forcing::{DAMPING, ROUNDS},
         member::{self, Counters, Decay, NEVER, Observed, Parameters, Progress, Report},
         observe::{MAX_DRIFT, MAX_GAP, MAX_TURN, MIN_EDGE, NEAR},
         pace,
@@ -365,6 +365,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("KEPT_AREA", KEPT_AREA as f64),
         ("KEPT_LENGTH", KEPT_LENGTH as f64),
         ("ROUNDS", ROUNDS as f64),
+        ("DAMPING", DAMPING),
+        ("TAU", std::f64::consts::TAU),
         ("MOST_WAVES", MOST_WAVES as f64),
         ("WAVE", WAVE as f64),
         ("TRACE_FIELDS", shader::TRACE_FIELDS as f64),

@@ -71,7 +71,10 @@ impl<N: Number> Position<'_, N> {
         let middle = ir * iq * irp;
         let low = ir * ir * (iqm + iq);
         let high = irp * irp * (iq + iqp);
-        let phi = half * (self.motion.law.phi(k) + self.motion.law.phi(kp));
+        let phi = match self.motion.law.kind.is_forced() {
+            true => self.motion.damping,
+            false => half * (self.motion.law.phi(k) + self.motion.law.phi(kp)),
+        };
         let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
         [a, (phi * ir + drift) - (middle + low + a), (phi * irp - drift) - (middle + high + e), e]
     }
@@ -96,7 +99,7 @@ impl<N: Number> Position<'_, N> {
             (phi, phi_after) = (mobile * phi, mobile_after * phi_after);
             current = motion.mobile_there[i] * current;
         }
-        let mean = half * (phi + phi_after);
+        let mean = if motion.law.kind.is_forced() { motion.damping } else { half * (phi + phi_after) };
         let turned = half * ((k + kp) * current) + (phi_after - phi);
         let drift = half * (motion.alpha[i] - turned * iq);
         let both = here * (s + sp);

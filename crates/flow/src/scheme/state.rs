@@ -289,6 +289,8 @@ pub struct Motion<N> {
     pub law: Law<N>,
     /// The force along the inward normal, beside the law.
     pub force: N,
+    /// What stands for φ in the position equation where forces act.
+    pub damping: N,
     /// `b(k)`.
     pub b: Ring<N>,
     /// Normal velocity β.
@@ -363,6 +365,7 @@ impl<N: Number> Workspace<N> {
             motion: Motion {
                 law: Law::default(),
                 force: N::default(),
+                damping: N::default(),
                 b: ring(),
                 beta: nodes(),
                 rkb: nodes(),
