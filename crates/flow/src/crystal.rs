@@ -16,12 +16,17 @@ use std::{
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::{error::echo, text::number};
+use curvelax_base::{
+    error::echo,
+    text::{number, rounded},
+};
 
 /// Waves of one function: what the numbers of a law have room for.
 pub const MOST_WAVES: usize = 2;
 /// The highest wave. The corners of a higher one need more nodes than a curve has.
 pub const HIGHEST_WAVE: u32 = 12;
+/// The largest angle, ten turns: of a larger one few digits are left.
+const LARGEST_ANGLE: f64 = 3600.0;
 /// Numbers of a wave in the law.
 pub const WAVE: usize = 3;
 /// Directions at which the least value of a function is looked for.
@@ -136,7 +141,14 @@ impl FromStr for Waves {
                 _ => return Err(usage()),
             };
             if mode.fract() != 0.0 || !(1.0..=f64::from(HIGHEST_WAVE)).contains(&mode) {
-                return Err(format!("{} is not a number M of waves; use 1 to {HIGHEST_WAVE}", number(mode)));
+                let problem = "is not a number M of waves: use a whole one up to";
+                return Err(format!("{} {problem} {HIGHEST_WAVE}", number(mode)));
+            }
+            if !(degrees.abs() <= LARGEST_ANGLE) {
+                return Err(format!(
+                    "an angle of {} degrees; use -{LARGEST_ANGLE} to {LARGEST_ANGLE}",
+                    number(degrees)
+                ));
             }
             if waves.iter().any(|wave| f64::from(wave.mode) == mode) {
                 return Err(format!("two waves of M = {mode} are one; write it once"));
@@ -208,8 +220,8 @@ impl FromStr for Energy {
             false => Err(format!(
                 "the equation is ill-posed, since the stiffness 1 - EPS (M^2 - 1) cos M(psi - DEG) of the surface falls to \
                  {}: such crystals have corners and facets; use a smaller EPS, below {} for M = {}",
-                number((1e4 * least).round() / 1e4),
-                number((1e4 / energy.highest_factor()).floor() / 1e4),
+                number((1e4 * least).floor() / 1e4),
+                rounded(1.0 / energy.highest_factor(), 4),
                 energy.0.highest_mode().unwrap_or_default(),
             )),
         }
@@ -456,7 +468,7 @@ mod tests {
             ("sin:4,0.1", "`sin:4,0.1` is not cos:M,SIZE"),
             ("cos:4", "is not cos:M,SIZE"),
             ("cos:4,x", "`x` is not a finite number"),
-            ("cos:2.5,0.1", "2.5 is not a number M of waves; use 1 to 12"),
+            ("cos:2.5,0.1", "2.5 is not a number M of waves: use a whole one up to 12"),
             ("cos:13,0.001", "13 is not a number"),
             ("cos:1,0.1", "use M from 2 on"),
             ("cos:4,0.01+cos:4,0.01,45", "two waves of M = 4 are one"),

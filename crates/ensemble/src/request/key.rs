@@ -157,8 +157,8 @@ keys! {
     #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
     #[allow(rustdoc::broken_intra_doc_links)] // the brackets of a grammar
     pub struct Spec {
-        /// Number of members. Of outlines, the number of copies of each; without the flag, each runs once, unperturbed
-        /// [default: 256]
+        /// Number of members. Of outlines, the number of copies of each, perturbed by --amplitude; of files:PATTERN without the
+        /// flag, each runs once, unperturbed [default: 256]
         curves: u64 = 256, "COUNT", Ensemble;
         /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -288,7 +288,8 @@ keys! {
         /// Use it for rough outlines [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_at: Option<f64> = None, "EXCESS", Evolution;
-        /// End a member as soon as it is relaxed [default: false; with --t-end auto true, unless it is driven to vanish]
+        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there [default: false; with --t-end
+        /// auto true]
         #[serde(skip_serializing_if = "Option::is_none")]
         stop_when_relaxed: Option<bool> = None, "BOOL", Evolution;
         /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n → ∞:

@@ -198,20 +198,14 @@ impl Spec {
         !(times || rates || outputs || TIMED.into_iter().any(swept))
     }
 
-    /// Whether a member ends when it is relaxed.
+    /// Whether a member ends when it is relaxed; one that is driven to a point ends there.
     pub fn stops_when_relaxed(&self) -> bool {
-        self.stop_when_relaxed
-            .unwrap_or(self.t_end == Some(FinalTime::Auto) && !(self.may_vanish() || self.keeps_both()))
+        self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto) && !self.keeps_both())
     }
 
     /// Whether both area and length are kept, so that the end is no circle, and known only when it is reached.
     pub fn keeps_both(&self) -> bool {
         self.conserve == Some(Conserved::AreaAndLength) || self.sweep.has("conserve")
-    }
-
-    /// Whether members are driven inwards by a constant force, at least some: they are followed until they vanish.
-    fn may_vanish(&self) -> bool {
-        self.is_driven_inwards() || self.sweep.has("drive")
     }
 
     /// Whether a constant force drives members inwards.

@@ -86,8 +86,8 @@ impl Spec {
         self.t_end.get_or_insert(DEFAULT_T_END.into());
         if self.stops_when_relaxed() {
             self.stop_when_relaxed = Some(true);
-        } else if self.t_end == Some(FinalTime::Auto) && (self.sweep.has("drive") || self.sweep.has("conserve")) {
-            // Cells whose members vanish must not differ in it from those whose members grow.
+        } else if self.t_end == Some(FinalTime::Auto) && self.sweep.has("conserve") {
+            // Cells that keep both must not differ in it from others.
             self.stop_when_relaxed = Some(false);
         }
         if self.relax_at.is_none() {

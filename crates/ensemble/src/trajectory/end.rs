@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-use super::{Course, Time, Trajectory, watch::ROUND};
+use super::{Course, Time, Trajectory, vanishing::Vanishing, watch::ROUND};
 use crate::{Ended, Features, Observables, Outcome, Portrait, Status, outcome};
 use curvelax_curve::polygon;
 use curvelax_flow::{
@@ -66,9 +66,11 @@ impl Trajectory<'_> {
             }
         };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
-        // What happens to a curve at rest takes nothing from its time.
+        // What happens to a curve at rest takes nothing from its time; one that is driven to a point is never at rest.
+        let on_its_way = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
         let status = match failed {
             Some(Status::Vanished) => Status::Vanished,
+            Some(failed) if on_its_way && failed != Status::Relaxed => failed,
             _ if t_relax.is_some() => Status::Relaxed,
             failed => failed.unwrap_or(Status::Unfinished),
         };

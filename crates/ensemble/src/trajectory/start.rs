@@ -51,12 +51,14 @@ impl<'a> Trajectory<'a> {
         let forcing = forcing.kept_from([polygon::signed_area(&member.nodes), polygon::length(&member.nodes)]);
         let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
-        launch.counters.stop_when_relaxed = spec.stops_when_relaxed().into();
         launch.counters.order =
             FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
         let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
         let start = Observables::new(&launch.report.now, turning, unit);
+        let vanishing = Vanishing::new(flow.clone(), forcing, (&start, nodes.len()), unit, precision);
+        let stops = spec.stops_when_relaxed() && !vanishing.as_ref().is_some_and(Vanishing::is_expected);
+        launch.counters.stop_when_relaxed = stops.into();
         let limit = spec.threshold(member.given_excess.unwrap_or(start.excess));
         let course = match spec.keeps_both() {
             true => Course::Settling,
@@ -70,7 +72,7 @@ impl<'a> Trajectory<'a> {
             .growth(&flow, &forcing, start.area)
             .map_or(0.0, |growth| (growth / clock).min(*schedule::range(precision).end()));
         let status = match course {
-            Course::Round if spec.stops_when_relaxed() => Some(Status::Relaxed),
+            Course::Round if stops => Some(Status::Relaxed),
             _ if beyond(&parameters, precision) => Some(Status::Nonfinite),
             _ => out_of_range,
         };
@@ -94,7 +96,7 @@ impl<'a> Trajectory<'a> {
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
-            vanishing: Vanishing::new(flow, forcing, (&start, nodes.len()), unit, precision),
+            vanishing,
             t_vanish: None,
             settling: Settling::of(spec, &start),
             conserved: forcing.conserved.is_some(),
