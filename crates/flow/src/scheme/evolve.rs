@@ -18,7 +18,7 @@ use super::{
     step::{self, Method, Stepped, Steps},
 };
 use crate::{
-    number::{Mask, Number, Real, ln_ratio},
+    number::{Mask, Number, Real, ln_ratio, place},
     solver::{Blocks, Solves, by_solver},
 };
 
@@ -221,7 +221,19 @@ impl<N: Number> Team<N> {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
             decline = observe::decline(&work.new, slope, bend, sizes, parameters, branches.law, work.blocks);
         }
-        let excess = observe::excess(seen.tension, seen.area, parameters);
+        let mut excess = observe::excess(seen.tension, seen.area, parameters);
+        if std::env::var("EXACT").is_ok() && N::EPSILON > 1e-10 {
+            let n = work.new.len();
+            let (mut l, mut a) = (0.0, 0.0);
+            let at = |i: usize| glam::DVec2::new(place::to_f64(work.new.x[i % n].lane(0)), place::to_f64(work.new.y[i % n].lane(0)));
+            for i in 0..n {
+                l += at(i).distance(at(i + 1));
+                a += 0.5 * at(i).perp_dot(at(i + 1));
+            }
+            let pi = std::f64::consts::PI;
+            let ratio = n as f64 / pi * (pi / n as f64).tan();
+            excess = N::of(l * l / (4.0 * pi * a.abs()) - ratio);
+        }
         Attempt { stepped, errors, decline, seen, excess }
     }
 

@@ -110,7 +110,8 @@ pub fn is_at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
 /// rounding of the solves says nothing. The largest weight of their systems is about 16h/(L/n)⁴.
 pub fn allowed<T: Real>(h: T, length: T, n: T, p: &Parameters<T>) -> T {
     let edge = length / n;
-    (T::of(4.0 * ROUNDING * T::EPSILON) * (h.sqrt() / (edge * edge))).max(p.adaptive)
+    let floor: f64 = std::env::var("FLOOR").ok().and_then(|v| v.parse().ok()).unwrap_or(1.0);
+    (T::of(4.0 * ROUNDING * T::EPSILON) * (h.sqrt() / (edge * edge)) * T::of(floor)).max(p.adaptive)
 }
 
 /// Returns the ratio of the next step to one of order `order` with error `error`, which scales with that power of the

@@ -120,6 +120,7 @@ pub fn step_by<N: Number, S: Solves>(
         curvature.system.assemble(&equations);
     }
     let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
+    refine::<N, S, 1>(&equations, [&mut increments.k], curvature, *blocks, &control, live);
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -132,6 +133,7 @@ pub fn step_by<N: Number, S: Solves>(
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
     let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
+    refine::<N, S, 2>(&equations, [&mut increments.x, &mut increments.y], position, *blocks, &control, live);
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);
@@ -147,5 +149,36 @@ pub fn step_by<N: Number, S: Solves>(
         sweeps_x: N::select(for_k.converged, for_x.sweeps, N::of(0.0)),
         solved: for_k.converged.and(for_x.converged),
         finite: for_k.finite.and(for_x.finite.or(for_k.converged.not())),
+    }
+}
+
+fn refine<N: Number, S: Solves, const F: usize>(
+    equations: &impl crate::solver::Equations<N, F>,
+    unknown: [&mut crate::solver::Ring<N>; F],
+    memory: &mut crate::solver::Memory<N, F>,
+    blocks: crate::solver::Blocks,
+    control: &Control<N>,
+    live: N::Mask,
+) {
+    use crate::solver::Ring;
+    let times: u32 = std::env::var("REFINE").ok().and_then(|v| v.parse().ok()).unwrap_or(0);
+    let from: usize = std::env::var("ONLY").ok().and_then(|v| v.parse().ok()).unwrap_or(1);
+    if N::EPSILON < 1e-10 || F < from { return; }
+    let n = blocks.n;
+    for _ in 0..times {
+        let mut left: [Ring<N>; F] = std::array::from_fn(|_| Ring::zeros(n));
+        let mut more: [Ring<N>; F] = std::array::from_fn(|_| Ring::zeros(n));
+        for i in 0..n {
+            let rhs = equations.equation(i).rhs;
+            for f in 0..F {
+                left[f][i] = rhs[f] - equations.applied(i, unknown[f]);
+            }
+        }
+        let system = crate::solver::system::Remaining { of: equations, left: &left };
+        S::solve(&system, more.each_mut(), memory, blocks, control, live);
+        for f in 0..F {
+            for i in 0..n { unknown[f][i] += more[f][i]; }
+            unknown[f].close();
+        }
     }
 }
