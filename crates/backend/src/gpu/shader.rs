@@ -2,6 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
+    scheme::observe::apothem,
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -150,8 +151,11 @@ pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
 }
 
 /// Returns the `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
+    let [apothem, rest] = apothem(blocks.n);
     [
+        ("APOTHEM", apothem),
+        ("APOTHEM_REST", rest),
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),

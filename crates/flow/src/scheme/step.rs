@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{Order, Solver, Solves, by_solver, sweeps::Control},
+    solver::{Order, Solver, Solves, by_solver, refinement, sweeps::Control},
 };
 
 /// The settings that the members of a run share.
@@ -102,7 +102,8 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, by, gradients, traced } = work;
+    let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, traced } = work;
+    let refined = branches.is_refined::<N, S>();
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
@@ -119,8 +120,18 @@ pub fn step_by<N: Number, S: Solves>(
     if *traced {
         curvature.system.assemble(&equations);
     }
-    let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
-    refine::<N, S, 1>(&equations, [&mut increments.k], curvature, *blocks, &control, live);
+    let for_k = match refined {
+        true => refinement::solve::<N, S, 1>(
+            &equations,
+            [&mut increments.k],
+            curvature,
+            of_curvature,
+            *blocks,
+            &control,
+            live,
+        ),
+        false => S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live),
+    };
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -132,8 +143,10 @@ pub fn step_by<N: Number, S: Solves>(
     }
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
-    refine::<N, S, 2>(&equations, [&mut increments.x, &mut increments.y], position, *blocks, &control, live);
+    let for_x = match refined {
+        true => refinement::solve::<N, S, 2>(&equations, unknowns, position, of_position, *blocks, &control, live),
+        false => S::solve(&equations, unknowns, position, *blocks, &control, live),
+    };
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);
@@ -149,36 +162,5 @@ pub fn step_by<N: Number, S: Solves>(
         sweeps_x: N::select(for_k.converged, for_x.sweeps, N::of(0.0)),
         solved: for_k.converged.and(for_x.converged),
         finite: for_k.finite.and(for_x.finite.or(for_k.converged.not())),
-    }
-}
-
-fn refine<N: Number, S: Solves, const F: usize>(
-    equations: &impl crate::solver::Equations<N, F>,
-    unknown: [&mut crate::solver::Ring<N>; F],
-    memory: &mut crate::solver::Memory<N, F>,
-    blocks: crate::solver::Blocks,
-    control: &Control<N>,
-    live: N::Mask,
-) {
-    use crate::solver::Ring;
-    let times: u32 = std::env::var("REFINE").ok().and_then(|v| v.parse().ok()).unwrap_or(0);
-    let from: usize = std::env::var("ONLY").ok().and_then(|v| v.parse().ok()).unwrap_or(1);
-    if N::EPSILON < 1e-10 || F < from { return; }
-    let n = blocks.n;
-    for _ in 0..times {
-        let mut left: [Ring<N>; F] = std::array::from_fn(|_| Ring::zeros(n));
-        let mut more: [Ring<N>; F] = std::array::from_fn(|_| Ring::zeros(n));
-        for i in 0..n {
-            let rhs = equations.equation(i).rhs;
-            for f in 0..F {
-                left[f][i] = rhs[f] - equations.applied(i, unknown[f]);
-            }
-        }
-        let system = crate::solver::system::Remaining { of: equations, left: &left };
-        S::solve(&system, more.each_mut(), memory, blocks, control, live);
-        for f in 0..F {
-            for i in 0..n { unknown[f][i] += more[f][i]; }
-            unknown[f].close();
-        }
     }
 }

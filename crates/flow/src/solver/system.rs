@@ -120,30 +120,6 @@ impl<N: Number, const F: usize> Equations<N, F> for System<N, F> {
     }
 }
 
-/// The equations for what a solution lacks.
-pub struct Remaining<'a, N, E, const F: usize> {
-    /// Those of the solution.
-    pub of: &'a E,
-    /// What it leaves of the right-hand sides.
-    pub left: &'a [Ring<N>; F],
-}
-
-impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remaining<'_, N, E, F> {
-    #[inline(always)]
-    fn equation(&self, i: usize) -> Equation<N, F> {
-        let mut own = self.of.equation(i);
-        for f in 0..F {
-            own.rhs[f] = self.left[f][i];
-        }
-        own
-    }
-
-    #[inline(always)]
-    fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
-        self.of.applied(i, unknown)
-    }
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
