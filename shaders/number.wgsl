@@ -13,9 +13,9 @@ fn bounded_abs(v: vec) -> vec {
     return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
 }
 
-/// A number without all but its leading nine binary digits, if numbers are short.
+/// A number without all but its leading eight binary digits, if numbers are short.
 fn coarse(value: real) -> real {
-    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff8000u));
+    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff0000u));
 }
 
 /// Halvings and terms of the logarithm.

@@ -201,7 +201,7 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Rounds down to an integer.
     fn floor(self) -> Self;
-    /// The number without all but its leading nine binary digits if it has 24.
+    /// The number without all but its leading eight binary digits if it has 24.
     fn coarse(self) -> Self;
 }
 
@@ -318,7 +318,7 @@ macro_rules! real {
 }
 
 real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0, 0);
-real!(f32, F32, "f32", 23, 127, 12_582_912.0, 0x7fff);
+real!(f32, F32, "f32", 23, 127, 12_582_912.0, 0xffff);
 
 /// Maximum number of halvings that bring a ratio near 1.
 pub const LN_HALVINGS: u32 = 64;
