@@ -103,7 +103,7 @@ fn weak_perturbations_relax_in_f32() {
 
 #[test]
 fn the_excess_in_f32_is_right_to_its_eighth_decimal() {
-    for n in [7, 100, 200] {
+    for n in [64, 100, 200] {
         for aspect in [1.0, 1.001, 1.05, 1.2] {
             let nodes = ellipse(n, aspect);
             let polygon_ratio = n as f64 / PI * (PI / n as f64).tan();
