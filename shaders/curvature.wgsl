@@ -25,10 +25,26 @@ fn curvature_equation() {
     let row_c = (here(r_new) * rate - rkb) - (row_a + row_b + row_d + row_e);
     let rise = rises(Window(b(wk.low), b(wk.high)));
     let forcing = rise.plus1 * iqh - rise.here * iqm;
-    let by = offsets(wk);
-    let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
     normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
-    rhs_x = (forcing + rkb * k - stiff) * inverse;
+    rhs_x = (forcing + rkb * k - stiff_curvature(rises(wk))) * inverse;
+}
+
+/// The rows times an unknown of these windows.
+fn curvature_applied(w: Window) -> vec {
+    return (here(r_new) * (real(1.0) / tau) - rkb) * here(w) + stiff_curvature(rises(w));
+}
+
+/// The part of that in which an unknown is seen by its differences, as differences of its second derivative.
+fn stiff_curvature(by: Rises) -> vec {
+    let iqm = minus1(iq);
+    let iqh = here(iq);
+    let first = by.here * iqm;
+    let second = by.plus1 * iqh;
+    let bend_before = (first - by.minus1 * minus2(iq)) * minus1(ir);
+    let bend = (second - first) * here(ir);
+    let bend_after = (by.plus2 * plus1(iq) - second) * plus1(ir);
+    let advection = real(0.5) * (alpha_before * by.here + alpha * by.plus1);
+    return ((bend_after - bend) * iqh - (bend - bend_before) * iqm) - advection;
 }
 
 /// The equations of a crystal: the stiff terms are those of w = g k, with M at the nodes.

@@ -131,7 +131,9 @@ fn errors_of_attempt(largest: LargestGaps) -> vec2<real> {
     let m = largest.fields;
     let size = max(others.x, others.y);
     let spread = min(others.x + others.y, size);
-    let scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
+    var scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
+    // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
+    if IS_SHORT { scale = max(scale, size * (real(NOISE * EPSILON) / tolerance())); }
     let relative = bounded_abs(m / scale);
     let errors = vec2(max(relative.x, m.y), max(relative.z, m.w));
     if !GEOMETRIC { return errors; }

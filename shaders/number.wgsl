@@ -2,12 +2,20 @@
 
 alias vec = vec4<real>;
 
+/// Whether numbers have so few digits that sums, differences and solves must be made with care.
+const IS_SHORT = EPSILON > 1e-10;
+
 /// Values above this bound count as not finite. `!(abs(x) <= BIG)` also holds for NaN; `x != x` never does.
 const BIG = 1e18;
 
 /// |v|, or 2 BIG if that is NaN or above BIG, so that maxima can be taken safely.
 fn bounded_abs(v: vec) -> vec {
     return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
+}
+
+/// A number without all but its leading eight binary digits, if numbers are short.
+fn coarse(value: real) -> real {
+    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff0000u));
 }
 
 /// Halvings and terms of the logarithm.

@@ -20,6 +20,9 @@ var<private> extremes: vec;
 /// Largest curvature, minus the smallest, largest displacement of a node.
 var<private> others: vec;
 
+/// Distance of the new curve from equilibrium.
+var<private> distance: real;
+
 /// What the excess compares with the area: the length, of a crystal its surface energy.
 fn total_tension() -> real {
     if CRYSTAL { return sums.z; }
@@ -68,6 +71,7 @@ fn corner(wx: Window, wy: Window) -> Corner {
 /// `x_{i-1} × x_i`.
 fn cross(wx: Window, wy: Window) -> vec {
     let at = corner(wx, wy);
+    if IS_SHORT { return at.before_x * rises_of_places(wy).here - rises_of_places(wx).here * at.before_y; }
     return at.before_x * at.y - at.x * at.before_y;
 }
 
@@ -76,9 +80,26 @@ fn quotient(length: real, area: real) -> real {
     return length * length / (all_parameters[member].law[QUOTIENT] * abs(area));
 }
 
-/// The distance from equilibrium: the quotient minus that of the regular polygon.
-fn excess(length: real, area: real) -> real {
-    return quotient(length, area) - all_parameters[member].polygon_ratio;
+/// The regular polygon that the sums of a curve are compared with, node by node: its edge, m² times the leading digits of
+/// the apothem of edge 1, and by how much the whole exceeds that, as a share.
+struct Regular { edge: real, cross: real, rest: real }
+
+/// The polygon with about this length; none where numbers are long.
+fn regular_near(length: real) -> Regular {
+    let edge = coarse(length / real(NODES));
+    return Regular(edge, edge * edge * real(APOTHEM), real(APOTHEM_REST));
+}
+
+/// The distance from equilibrium by the sums over what edges and `x_{i-1} × x_i` exceed those of the polygon by.
+fn excess_over(regular: Regular, longer: real, more: real) -> real {
+    let plain = quotient(total_tension(), sums.y) - all_parameters[member].polygon_ratio;
+    if !IS_SHORT || CRYSTAL { return plain; }
+    let by = longer / (real(NODES) * regular.edge);
+    let by_area = more / (real(NODES) * regular.cross);
+    let whole = real(1.0) + by;
+    let over = (by + by) + by * by + regular.rest * (whole * whole) - by_area;
+    let value = all_parameters[member].polygon_ratio * (over / (real(1.0) + by_area));
+    return select(value, plain, sums.y <= real(0.0));
 }
 
 /// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
@@ -119,8 +140,7 @@ fn decline() -> vec2<real> {
     let slope_of_ratio = real(2.0) * growth - widening;
     let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
         - (half * all.w / sums.y - widening * widening);
-    let ratio = quotient(length, sums.y);
-    let over = ratio / (ratio - all_parameters[member].polygon_ratio);
+    let over = quotient(length, sums.y) / distance;
     let falls = over * slope_of_ratio;
     return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
 }
@@ -159,7 +179,14 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
         }
     }
     let turning = winding(x.here, y.here, x.plus1, y.plus1);
-    let part = vec(block_sum(own), block_sum(cross(wx, wy)), block_sum(energy), block_sum(turning));
+    var regular = Regular();
+    if IS_SHORT {
+        settle();
+        regular = regular_near(ring_sums(vec(block_sum(own), 0.0, 0.0, 0.0)).x);
+    }
+    let longer = own - vec(regular.edge);
+    let more = cross(wx, wy) - vec(regular.cross);
+    let part = vec(block_sum(longer), block_sum(more), block_sum(energy), block_sum(turning));
     let shortest = -bounded_abs(own);
     let extremes_of_block = vec(
         block_max(bounded_abs(kh * rh)),
@@ -171,14 +198,20 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     settle();
     let all = ring_summary(part, extremes_of_block, others_of_block);
     sums = vec(all.sums.x, real(0.5) * all.sums.y, all.sums.zw);
+    if IS_SHORT {
+        let nodes = real(NODES);
+        sums.x = nodes * regular.edge + all.sums.x;
+        sums.y = real(0.5) * (nodes * regular.cross + all.sums.y);
+    }
     extremes = all.extremes;
     others = all.others;
+    distance = excess_over(regular, all.sums.x, all.sums.y);
 }
 
 /// Derives the observables from the last `observe`.
 fn observed() -> Observed {
     return Observed(
-        sums.x, sums.y, excess(total_tension(), sums.y), energy_of_sums(), -others.y, others.x, extremes.z / -extremes.w, extremes.y,
+        sums.x, sums.y, distance, energy_of_sums(), -others.y, others.x, extremes.z / -extremes.w, extremes.y,
     );
 }
 

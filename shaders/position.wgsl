@@ -38,8 +38,32 @@ fn position_equation() {
         rhs_y = force.y * inverse;
         return;
     }
-    rhs_x = residual_of_old(row_a, row_b, row_d, row_e, old.a) * inverse;
-    rhs_y = residual_of_old(row_a, row_b, row_d, row_e, old.b) * inverse;
+    rhs_x = -stiff_position(rises_of_places(old.a)) * inverse;
+    rhs_y = -stiff_position(rises_of_places(old.b)) * inverse;
+}
+
+/// The rows times an unknown of these windows.
+fn position_applied(w: Window) -> vec {
+    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    return q * (real(1.0) / tau) * here(w) + stiff_position(rises(w));
+}
+
+/// The part of that in which an unknown is seen by its differences, as differences of its second derivative.
+fn stiff_position(by: Rises) -> vec {
+    let wk = k_window;
+    let irh = here(ir);
+    let irp = plus1(ir);
+    let iqh = here(iq);
+    let slope = by.here * irh;
+    let slope_after = by.plus1 * irp;
+    let bend_before = (slope - by.minus1 * minus1(ir)) * minus1(iq);
+    let rise = slope_after - slope;
+    let bend = rise * iqh;
+    let bend_after = (by.plus2 * plus2(ir) - slope_after) * plus1(iq);
+    let stiff = (bend_after - bend) * irp - (bend - bend_before) * irh;
+    let mean_phi = real(0.5) * (phi(here(wk)) + phi(plus1(wk)));
+    let drift = real(0.5) * alpha - real(0.75) * (rise_of_square(wk) * iqh);
+    return stiff + (mean_phi * rise - drift * (by.here + by.plus1));
 }
 
 /// The equations of a crystal, with `phi = M w k` and the drift `(M ∂w k + ∂(M w k))/2`.
@@ -80,9 +104,4 @@ fn position_of_crystal() {
     let force = of_polygon(old.a, old.b, given);
     rhs_x = force.x * inverse;
     rhs_y = force.y * inverse;
-}
-
-fn residual_of_old(a: vec, b: vec, d: vec, e: vec, w: Window) -> vec {
-    let by = offsets_of_places(w);
-    return -(a * by.minus2 + b * by.minus1 + d * by.plus1 + e * by.plus2);
 }

@@ -18,6 +18,10 @@ override BLOCKS: u32;
 /// Threads: at least one per block, in whole subgroups.
 override THREADS: u32;
 
+/// The leading digits of 1/(2 tan(π/n)), and the rest as a share of them.
+override APOTHEM: f32;
+override APOTHEM_REST: f32;
+
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;
 var<private> block: u32;
@@ -131,11 +135,6 @@ fn rises(w: Window) -> Rises {
 }
 
 /// The same for places.
-fn offsets_of_places(w: Window) -> Offsets {
-    let at = here(w);
-    return Offsets(apart(at, minus2(w)), apart(at, minus1(w)), apart(at, plus1(w)), apart(at, plus2(w)));
-}
-
 fn rises_of_places(w: Window) -> Rises {
     return Rises(
         apart(minus2(w), minus1(w)), apart(minus1(w), here(w)), apart(here(w), plus1(w)), apart(plus1(w), plus2(w)),

@@ -3,6 +3,9 @@
 /// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
+/// Whether solutions are refined, and the nodes above which they are refined twice.
+const REFINED = IS_SHORT && ADAPTIVE && !SWEEPS && !CRYSTAL;
+const ONCE = 200u;
 
 /// The new curve, with the windows of its nodes.
 var<private> new_k: vec;
@@ -41,6 +44,7 @@ fn forget() {
     extremes = vec();
     others = vec();
     displacement = vec();
+    distance = 0.0;
     multiplier = 0.0;
     force = 0.0;
     damping = 0.0;
@@ -64,11 +68,23 @@ fn step(begun: Course, moves: bool) -> Course {
         begin_curvature();
     }
     // The two solves share a call, since compilers inline the body of every call.
+    var round = 0u;
     loop {
-        if positions { begin_positions(); }
+        if positions {
+            begin_positions(round);
+        } else if round > 0u {
+            curvature_equation();
+        }
+        if REFINED && round > 0u { leave_the_rest(positions); }
         let negligible = select(rounding / radius, rounding * radius, positions);
         let done = solve(positions, negligible, course.solve_sweeps, course.sweeps);
         let made = done.sweeps - course.solve_sweeps;
+        if REFINED {
+            gather(positions, round > 0u);
+            round += 1u;
+            if done.ended == SOLVED && round <= select(1u, 2u, NODES > ONCE) { continue; }
+            round = 0u;
+        }
         if positions { end_positions(made); } else { end_curvature(made); }
         course.sweeps -= min(course.sweeps, made);
         course.ended = done.ended;
@@ -110,9 +126,33 @@ fn end_curvature(made: u32) {
     trace(9u, u);
 }
 
-fn begin_positions() {
+/// Takes what the increments so far give from the right-hand sides.
+fn leave_the_rest(positions: bool) {
+    settle();
+    if positions {
+        let given = windows(load_field(INCREMENTS + 1u), load_field(INCREMENTS + 2u));
+        rhs_x -= position_applied(given.a) * inverse;
+        rhs_y -= position_applied(given.b) * inverse;
+    } else {
+        rhs_x -= curvature_applied(lone_window(load_field(INCREMENTS))) * inverse;
+    }
+}
+
+/// Stores the increments, `more` than those before or the first ones.
+fn gather(positions: bool, more: bool) {
+    let field = select(INCREMENTS, INCREMENTS + 1u, positions);
+    if more { u += load_field(field); }
+    store_field(field, u);
+    if !positions { return; }
+    if more { v += load_field(INCREMENTS + 2u); }
+    store_field(INCREMENTS + 2u, v);
+}
+
+fn begin_positions(round: u32) {
     find_member();
-    new_k = advanced(2u, load_field(curve + 2u), u);
+    if round == 0u { new_k = advanced(2u, load_field(curve + 2u), u); }
+    // Others may still read what the last round exchanged.
+    if round > 0u { settle(); }
     // Lengths are exchanged again, so that their windows take no registers in the first solve.
     let exchanged = windows(new_k, here(r_new));
     k_window = exchanged.a;

@@ -2,6 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
+    scheme::{dense::resolved, observe::apothem},
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -103,10 +104,11 @@ fn of_solver(solver: Solver) -> &'static [ShaderPart] {
 pub fn source<T: Real>(variant: Variant) -> String {
     let Variant { solver, adaptive, watched, geometric, crystal, forced, .. } = variant;
     let (number, epsilon, root, sweeps) = (T::NAME, T::EPSILON, T::EPSILON.sqrt(), solver.sweeps());
+    let resolved = resolved::<T>();
     let mut text = format!(
-        "alias real = {number}; const EPSILON = {epsilon:e}; const ROOT_EPSILON = {root:e}; const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; \
-         const WATCHED = {watched}; const GEOMETRIC = {geometric}; const CRYSTAL = {crystal}; \
-         const FORCED = {forced};\n"
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ROOT_EPSILON = {root:e}; const RESOLVED = {resolved:e}; \
+         const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; const WATCHED = {watched}; \
+         const GEOMETRIC = {geometric}; const CRYSTAL = {crystal}; const FORCED = {forced};\n"
     );
     for (_, part) in variant.parts() {
         text.push_str(part);
@@ -150,8 +152,11 @@ pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
 }
 
 /// Returns the `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 4] {
+pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
+    let [apothem, rest] = apothem(blocks.n);
     [
+        ("APOTHEM", apothem),
+        ("APOTHEM_REST", rest),
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),

@@ -6,7 +6,10 @@
 //! number of several lanes which branch to take.
 
 use super::{Parameters, law::Kind};
-use crate::number::Real;
+use crate::{
+    number::{Number, Real},
+    solver::Solves,
+};
 
 /// The branches of one member, or of a group of members that share them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -23,6 +26,14 @@ pub struct Branches {
     pub watched: bool,
     /// What of the law decides which instructions are run.
     pub law: Kind,
+}
+
+impl Branches {
+    /// Returns whether solutions are refined: those of adaptive steps in f32 by the direct solver. Fixed steps are off by
+    /// more, and sweeps stop at their tolerance.
+    pub fn is_refined<N: Number, S: Solves>(&self) -> bool {
+        N::IS_SHORT && self.adaptive && !S::FACTS.sweeps && !self.law.is_crystal()
+    }
 }
 
 impl<T: Real> Parameters<T> {

@@ -10,7 +10,7 @@
 use super::{Curve, Parameters, forces, state::Motion};
 use crate::{
     number::Number,
-    solver::{Equation, Equations},
+    solver::{Equation, Equations, Ring},
 };
 
 /// The equations, from the old curve, its motion and the new lengths.
@@ -37,7 +37,6 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         if self.motion.law.kind.is_crystal() {
             return self.of_crystal(i);
         }
-        let [kmm, km, kp, kpp] = self.old.k.offsets(i);
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
@@ -53,12 +52,31 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let d = -(half * alpha) - (middle + high + e);
         let c = (r * self.rate - rkb) - (a + b + d + e);
         let forcing = rise_of_bp * iq - rise_of_b * iqm;
-        let stiff = a * kmm + b * km + d * kp + e * kpp;
+        let stiff = self.stiff(i, self.old.k.rises(i));
         Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.tau * ir }
+    }
+
+    #[inline(always)]
+    fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
+        let own = self.new.r[i] * self.rate - self.motion.rkb[i];
+        own * unknown[i] + self.stiff(i, unknown.rises(i))
     }
 }
 
 impl<N: Number> Curvature<'_, N> {
+    /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
+    #[inline(always)]
+    fn stiff(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
+        let [_, irm, ir, irp, _] = self.motion.ir.window(i);
+        let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
+        let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
+        let (first, second) = (here * iqm, after * iq);
+        let bend_before = (first - before * iqmm) * irm;
+        let bend = (second - first) * ir;
+        let bend_after = (last * iqp - second) * irp;
+        ((bend_after - bend) * iq - (bend - bend_before) * iqm) - N::of(0.5) * (alpha_m * here + alpha * after)
+    }
+
     /// The equation of a crystal.
     #[inline(always)]
     fn of_crystal(&self, i: usize) -> Equation<N, 1> {

@@ -6,9 +6,11 @@ use crate::number::{
     place::{coordinate, placed},
 };
 
-/// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
-/// and the excess is a small difference of numbers near 1. In f32 this is most of a run.
-pub const RESOLVED: f64 = 131_072.0;
+/// The excess below which its derivatives are mostly rounding: their weights amplify it a thousand times. The excess itself
+/// is off by some ε where it is a small difference of numbers near 1, and by a tenth of that in f32, where it is not.
+pub const fn resolved<N: Number>() -> f64 {
+    if N::IS_SHORT { 8192.0 * N::EPSILON } else { 131_072.0 * N::EPSILON }
+}
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;
 
@@ -221,7 +223,7 @@ impl<T: Real> Fall<T> {
             let ratio = h / progress.taken;
             Arc { start: Jet::scaled(zero, progress.slope, progress.bend, ratio), end }
         };
-        let resolved = T::of(RESOLVED * T::EPSILON).le(after);
+        let resolved = T::of(resolved::<T>()).le(after);
         if resolved && arc.is_tame() { Fall::Smooth(arc) } else { Fall::Exponential(fallen) }
     }
 }

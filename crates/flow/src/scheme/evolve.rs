@@ -6,7 +6,7 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay,
-    dense::{Arc, Fall, LOOKS, RESOLVED, Taken},
+    dense::{Arc, Fall, LOOKS, Taken, resolved},
     extrapolation::{self, AllShares, SHARED_PARTS},
     forcing,
     member::{Counters, NEVER, Observed},
@@ -60,7 +60,6 @@ struct Attempt<N: Number> {
     /// First and second derivative of ln excess at the end of an adaptive step.
     decline: [N; 2],
     seen: Glance<N>,
-    excess: N,
 }
 
 /// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
@@ -214,15 +213,15 @@ impl<N: Number> Team<N> {
         let seen = observe::glance(&state.curve, &work.new, parameters, branches.law, work.blocks);
         if branches.adaptive {
             let followed = self.excess.le(parameters.follow_to).not();
-            errors = extrapolation::errors_of_attempt(&state.gaps, &work.new, seen.length, followed, branches);
+            errors =
+                extrapolation::errors_of_attempt(&state.gaps, &work.new, seen.length, followed, parameters, branches);
         }
-        let sizes = [seen.tension, seen.area];
+        let sizes = [seen.tension, seen.area, seen.excess];
         if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
             decline = observe::decline(&work.new, slope, bend, sizes, parameters, branches.law, work.blocks);
         }
-        let excess = observe::excess(seen.tension, seen.area, parameters);
-        Attempt { stepped, errors, decline, seen, excess }
+        Attempt { stepped, errors, decline, seen }
     }
 
     /// The lengths of the next steps, their orders and the highest one.
@@ -309,7 +308,7 @@ impl<N: Number> Team<N> {
         let (n, adaptive) = (self.work.blocks.n, branches.adaptive);
         let [at_level, passed] =
             if branches.watched { self.at_levels(runs, branches) } else { [N::Mask::all_of(false); 2] };
-        let gap = self.gap_at_threshold(runs, live, attempt.excess, adaptive);
+        let gap = self.gap_at_threshold(runs, live, attempt.seen.excess, adaptive);
         let (finite, singular) =
             (attempt.seen.is_finite(), attempt.seen.is_singular(self.turning, &self.parameters, n));
         let mut kept = N::Mask::all_of(false);
@@ -324,7 +323,13 @@ impl<N: Number> Team<N> {
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
             let length = run.report.now.length;
             let allowed = adaptive.then(|| Allowed {
-                error: pace::allowed(stride.length, length, N::Real::of(n as f64), &run.parameters),
+                error: pace::allowed(
+                    stride.length,
+                    length,
+                    N::Real::of(n as f64),
+                    &run.parameters,
+                    branches.is_refined::<N, S>(),
+                ),
                 order: most_order.min(extrapolation::most_order(N::Real::EPSILON)),
             });
             if let Some(allowed) = allowed
@@ -341,7 +346,7 @@ impl<N: Number> Team<N> {
                     run.counters.status = cause as u32;
                 }
             } else {
-                let excess = [self.excess.lane(lane), attempt.excess.lane(lane)];
+                let excess = [self.excess.lane(lane), attempt.seen.excess.lane(lane)];
                 let decline = attempt.decline.map(|of| of.lane(lane));
                 let taken = taken(run, stride, excess, decline, gap.lane(lane), adaptive);
                 record_events(run, &taken, adaptive);
@@ -360,7 +365,7 @@ impl<N: Number> Team<N> {
         if S::FACTS.sweeps && !adaptive {
             start::after_step(&mut self.state.increments, &mut self.state.earlier);
         }
-        self.accept(kept, attempt.excess, adaptive);
+        self.accept(kept, attempt.seen.excess, adaptive);
     }
 
     /// The gap between k and the polygon of the new curves, if one of them may have relaxed. It costs a fifth of a
@@ -399,7 +404,7 @@ impl<N: Number> Team<N> {
                 _ => &state.part,
             };
             let sums = observe::sums(curve, parameters, branches.law, work.blocks);
-            seen[look] = observe::observed(&sums, &observe::maxima(curve), parameters);
+            seen[look] = observe::observed(&sums, &observe::maxima(curve));
         }
         let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };
         [observe::reaches_level(&seen[last], parameters), passed]
@@ -550,7 +555,7 @@ fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
-    let resolved = T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
+    let resolved = T::of(resolved::<T>()).le((excess * progress.slope).abs());
     if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
         progress.aim = pace::aim(ln_ratio(excess, p.relax_at), progress.slope, progress.bend, progress.taken);
     }

@@ -15,7 +15,8 @@
 //! step before: nobody needs that any more.
 
 use super::{
-    Branches, Curve, State,
+    Branches, Curve, Parameters, State,
+    pace::{self, NOISE},
     run::Run,
     state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from},
 };
@@ -230,6 +231,7 @@ pub fn errors_of_attempt<N: Number>(
     new: &Curve<N>,
     length: N,
     followed: N::Mask,
+    p: &Parameters<N>,
     branches: Branches,
 ) -> [N; 2] {
     let low = N::of(-2.0 * BIG);
@@ -246,7 +248,11 @@ pub fn errors_of_attempt<N: Number>(
     }
     let size = k_max.max(minus_k_min);
     let spread = (k_max + minus_k_min).min(size);
-    let scale = N::select(followed, (size * spread).sqrt(), size);
+    let mut scale = N::select(followed, (size * spread).sqrt(), size);
+    if N::IS_SHORT {
+        // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
+        scale = scale.max(size * (N::of(NOISE * N::EPSILON) / pace::tolerance(p)));
+    }
     let errors = [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)];
     if !branches.geometric {
         return errors;

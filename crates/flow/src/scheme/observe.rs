@@ -49,6 +49,8 @@ pub struct CurveSums<N> {
     pub turning: N,
     /// `Σ γ |e_i|`, the length for γ = 1.
     pub tension: N,
+    /// Distance from equilibrium.
+    pub excess: N,
 }
 
 /// The maxima; a value that is not finite shows as more than [`BIG`].
@@ -75,6 +77,8 @@ pub struct Glance<N> {
     pub tension: N,
     /// `½ Σ x_{i-1} × x_i`.
     pub area: N,
+    /// Distance from equilibrium.
+    pub excess: N,
     /// Windings of the edge vector round the origin.
     pub turning: N,
     /// `max |k_i| r_i`; a value that is not finite shows as more than [`BIG`].
@@ -95,6 +99,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
     let low = N::of(-2.0 * BIG);
     let (mut turn, mut slack, mut minus_shortest, mut minus_k_min, mut farthest) = (low, low, low, low, N::of(0.0));
     let mut sums = solver::Sums::new(blocks);
+    let regular = Regular::near(new, blocks);
     for i in 0..new.len() {
         let (k, r, e) = (new.k[i], new.r[i], edge(new, i)[2]);
         turn = turn.max((k * r).bounded_abs());
@@ -103,12 +108,15 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
         minus_k_min = minus_k_min.max(-k);
         let (dx, dy) = (apart(old.x[i], new.x[i]), apart(old.y[i], new.y[i]));
         farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
-        sums.add(i, [e, cross(new, i), winding(new, i)]);
+        let [longer, more] = regular.exceeded(new, i);
+        sums.add(i, [longer, more, winding(new, i)]);
     }
-    let [length, area, turning] = sums.totals();
-    let area = N::of(0.5) * area;
+    let [longer, more, turning] = sums.totals();
+    let [length, area] = regular.sizes([longer, more]);
     let tension = tension(new, length, &p.law(kind), blocks);
-    Glance { length, tension, area, turning, turn, slack, minus_shortest, minus_k_min, farthest: farthest.sqrt() }
+    let excess = regular.excess([longer, more], [tension, area], p, kind);
+    let farthest = farthest.sqrt();
+    Glance { length, tension, area, excess, turning, turn, slack, minus_shortest, minus_k_min, farthest }
 }
 
 impl<N: Number> Glance<N> {
@@ -160,27 +168,34 @@ fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
 #[inline(always)]
 pub fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
     let [xm, x, ym, y] = corner(curve, i);
+    if N::IS_SHORT {
+        let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
+        return xm * ey - ex * ym;
+    }
     xm * y - x * ym
 }
 
 /// Computes the sums over the ring.
 #[inline(always)]
 pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> CurveSums<N> {
-    let half = N::of(0.5);
     let mut sums = solver::Sums::new(blocks);
+    let regular = Regular::near(curve, blocks);
     for i in 0..curve.len() {
         let k = curve.k[i];
         let energy = match kind.conserved {
             0 => p.energy_density(k) * curve.r[i],
             _ => p.energy_at_vertex(edge(curve, i), edge(curve, (i + 1) % curve.len())),
         };
-        sums.add(i, [edge(curve, i)[2], cross(curve, i), energy, winding(curve, i)]);
+        let [longer, more] = regular.exceeded(curve, i);
+        sums.add(i, [longer, more, energy, winding(curve, i)]);
     }
-    let [length, area, energy, turning] = sums.totals();
+    let [longer, more, energy, turning] = sums.totals();
+    let [length, area] = regular.sizes([longer, more]);
     let law = p.law(kind);
     let tension = tension(curve, length, &law, blocks);
     let energy = if kind.is_crystal() { law.unit * tension } else { energy };
-    CurveSums { length, area: half * area, energy, turning, tension }
+    let excess = regular.excess([longer, more], [tension, area], p, kind);
+    CurveSums { length, area, energy, turning, tension, excess }
 }
 
 /// Computes the maxima over the ring.
@@ -205,10 +220,85 @@ fn quotient<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
     tension * tension / (p.law[QUOTIENT] * area.abs())
 }
 
-/// The distance from equilibrium: the quotient minus that of the polygon at equilibrium.
+/// The regular polygon that the sums of a curve in f32 are compared with, node by node: the length and the area of a curve
+/// that is nearly a circle say nothing of its excess once they are rounded.
+///
+/// With edges m and `C = m²/(2 tan(π/n))` at each node its quotient is just [`Parameters::polygon_ratio`]. So with the mean
+/// of `(|e_i| - m)/m`, λ, and that of `(x_{i-1} × x_i - C)/C`, σ, the excess is that times `((1 + λ)² - (1 + σ))/(1 + σ)`.
+#[derive(Clone, Copy, Debug)]
+struct Regular<N> {
+    nodes: N,
+    /// m, of few digits; 0 in f64.
+    edge: N,
+    /// m² and the leading digits of `1/(2 tan(π/n))`, whose product is exact.
+    cross: N,
+    /// By how much the whole C exceeds it, as a share.
+    rest: N,
+}
+
+impl<N: Number> Regular<N> {
+    /// The polygon with about the length of `curve`.
+    #[inline(always)]
+    fn near(curve: &Curve<N>, blocks: Blocks) -> Regular<N> {
+        let (n, zero) = (curve.len(), N::of(0.0));
+        let nodes = N::of(n as f64);
+        if !N::IS_SHORT {
+            return Regular { nodes, edge: zero, cross: zero, rest: zero };
+        }
+        let mut sums = solver::Sums::new(blocks);
+        for i in 0..n {
+            sums.add(i, [edge(curve, i)[2]]);
+        }
+        let [length] = sums.totals();
+        let [leading, rest] = apothem(n);
+        let edge = coarse(length / nodes);
+        Regular { nodes, edge, cross: edge * edge * N::of(leading), rest: N::of(rest) }
+    }
+
+    /// By how much edge i, and `x_{i-1} × x_i`, exceed its own.
+    #[inline(always)]
+    fn exceeded(&self, curve: &Curve<N>, i: usize) -> [N; 2] {
+        [edge(curve, i)[2] - self.edge, cross(curve, i) - self.cross]
+    }
+
+    /// Length and area, by the sums of that.
+    #[inline(always)]
+    fn sizes(&self, [longer, more]: [N; 2]) -> [N; 2] {
+        if !N::IS_SHORT {
+            return [longer, N::of(0.5) * more];
+        }
+        [self.nodes * self.edge + longer, N::of(0.5) * (self.nodes * self.cross + more)]
+    }
+
+    /// The distance from equilibrium: the quotient minus that of the polygon at equilibrium.
+    #[inline(always)]
+    fn excess(&self, [longer, more]: [N; 2], [tension, area]: [N; 2], p: &Parameters<N>, kind: Kind) -> N {
+        let plain = quotient(tension, area, p) - p.polygon_ratio;
+        if !N::IS_SHORT || kind.is_crystal() {
+            return plain;
+        }
+        let (one, longer, more) = (N::of(1.0), longer / (self.nodes * self.edge), more / (self.nodes * self.cross));
+        let whole = one + longer;
+        let over = (longer + longer) + longer * longer + self.rest * (whole * whole) - more;
+        // Of a curve that runs clockwise, or round next to nothing, there is no such polygon.
+        N::select(area.le(N::of(0.0)), plain, p.polygon_ratio * (over / (one + more)))
+    }
+}
+
+/// The leading digits of `1/(2 tan(π/n))` and the rest, as a share of them.
+pub fn apothem(n: usize) -> [f64; 2] {
+    let whole = 0.5 / (std::f64::consts::PI / n as f64).tan();
+    let leading = (whole as f32).coarse().to_f64();
+    [leading, (whole - leading) / leading]
+}
+
+/// The leading [digits](Real::coarse) of a number.
 #[inline(always)]
-pub fn excess<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
-    quotient(tension, area, p) - p.polygon_ratio
+fn coarse<N: Number>(mut value: N) -> N {
+    for lane in 0..N::LANES {
+        value.set_lane(lane, value.lane(lane).coarse());
+    }
+    value
 }
 
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
@@ -219,7 +309,7 @@ pub fn decline<N: Number>(
     curve: &Curve<N>,
     slope: &Curve<N>,
     bend: &Curve<N>,
-    [tension, area]: [N; 2],
+    [tension, area, excess]: [N; 3],
     p: &Parameters<N>,
     kind: Kind,
     blocks: Blocks,
@@ -254,8 +344,7 @@ pub fn decline<N: Number>(
     let (growth, widening) = (stretch / tension, half * area_slope / area);
     let slope = two * growth - widening;
     let bend = two * (bent / tension - growth * growth) - (half * area_bend / area - widening * widening);
-    let ratio = quotient(tension, area, p);
-    let over = ratio / (ratio - p.polygon_ratio);
+    let over = quotient(tension, area, p) / excess;
     let first = over * slope;
     [first, over * (bend + slope * slope) - first * first]
 }
@@ -286,16 +375,16 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
 /// Observes a curve.
 #[inline(never)]
 pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve), p)
+    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve))
 }
 
 /// Derives the observables from the sums and maxima of a curve.
 #[inline(always)]
-pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>, p: &Parameters<N>) -> Observed<N> {
+pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>) -> Observed<N> {
     Observed {
         length: sums.length,
         area: sums.area,
-        excess: excess(sums.tension, sums.area, p),
+        excess: sums.excess,
         energy: sums.energy,
         k_min: -maxima.minus_k_min,
         k_max: maxima.k_max,

@@ -10,7 +10,7 @@
 use super::{Branches, Curve, Parameters, forces, state::Motion};
 use crate::{
     number::Number,
-    solver::{Equation, Equations},
+    solver::{Equation, Equations, Ring},
 };
 
 /// The equations, from the old positions and the new lengths and curvatures.
@@ -49,16 +49,37 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let c = q * self.rate - (a + b + d + e);
         let rhs = match self.geometric {
             true => forces::of_polygon(self.old, self.motion, i),
-            false => [
-                residual_of_old(off, self.old.x.offsets_of_places(i)),
-                residual_of_old(off, self.old.y.offsets_of_places(i)),
-            ],
+            false => [-self.stiff(i, self.old.x.rises_of_places(i)), -self.stiff(i, self.old.y.rises_of_places(i))],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
+    }
+
+    #[inline(always)]
+    fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
+        let [_, _, r, rp, _] = self.new.r.window(i);
+        (r + rp) * N::of(0.5) * self.rate * unknown[i] + self.stiff(i, unknown.rises(i))
     }
 }
 
 impl<N: Number> Position<'_, N> {
+    /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
+    #[inline(always)]
+    fn stiff(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
+        let [_, _, k, kp, _] = self.new.k.window(i);
+        let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
+        let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
+        let half = N::of(0.5);
+        let (slope, slope_after) = (here * ir, after * irp);
+        let bend_before = (slope - before * irm) * iqm;
+        let rise = slope_after - slope;
+        let bend = rise * iq;
+        let bend_after = (last * irpp - slope_after) * iqp;
+        let stiff = (bend_after - bend) * irp - (bend - bend_before) * ir;
+        let phi = half * (self.motion.law.phi(k) + self.motion.law.phi(kp));
+        let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
+        stiff + (phi * rise - drift * (here + after))
+    }
+
     /// 𝓐, 𝓑, 𝓓 and 𝓔.
     #[inline(always)]
     fn of_paper(&self, i: usize) -> [N; 4] {
@@ -109,9 +130,4 @@ impl<N: Number> Position<'_, N> {
         let d = (mean * irp - drift) - (irp * (both + sp * after) + e);
         [a, b, d, e]
     }
-}
-
-#[inline(always)]
-fn residual_of_old<N: Number>([a, b, d, e]: [N; 4], [mm, m, p, pp]: [N; 4]) -> N {
-    -(a * mm + b * m + d * p + e * pp)
 }

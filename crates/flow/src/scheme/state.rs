@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::law::Law;
 use crate::{
     number::{Number, Real, place},
-    solver::{Blocks, Memory, Ring, Solves},
+    solver::{Blocks, Memory, Ring, Solves, refinement::Remainder},
 };
 
 /// Fields of a curve.
@@ -332,6 +332,10 @@ pub struct Workspace<N> {
     pub curvature: Memory<N, 1>,
     /// The position system and its solver.
     pub position: Memory<N, 2>,
+    /// What a refined curvature lacks.
+    pub of_curvature: Remainder<N, 1>,
+    /// What refined positions lack.
+    pub of_position: Remainder<N, 2>,
     /// How far the nodes of the new curve have moved, where forces move them.
     pub by: [Ring<N>; 2],
     /// The gradients of the new curve's area and length, x and y of each, where they are kept.
@@ -353,7 +357,7 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        23 + S::FACTS.numbers_per_node
+        23 + S::FACTS.numbers_per_node + if N::IS_SHORT { 6 } else { 0 }
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
@@ -383,6 +387,8 @@ impl<N: Number> Workspace<N> {
             new: Curve::zeros(n),
             curvature,
             position,
+            of_curvature: Remainder::zeros(if N::IS_SHORT { n } else { 0 }),
+            of_position: Remainder::zeros(if N::IS_SHORT { n } else { 0 }),
             by: std::array::from_fn(|_| ring()),
             gradients: std::array::from_fn(|_| ring()),
             traced: false,

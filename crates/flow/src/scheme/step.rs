@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     number::{Mask, Number, Real},
-    solver::{Order, Solver, Solves, by_solver, sweeps::Control},
+    solver::{Order, Solver, Solves, by_solver, refinement, sweeps::Control},
 };
 
 /// The settings that the members of a run share.
@@ -102,7 +102,8 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, by, gradients, traced } = work;
+    let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, traced } = work;
+    let refined = branches.is_refined::<N, S>();
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
@@ -119,7 +120,18 @@ pub fn step_by<N: Number, S: Solves>(
     if *traced {
         curvature.system.assemble(&equations);
     }
-    let for_k = S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live);
+    let for_k = match refined {
+        true => refinement::solve::<N, S, 1>(
+            &equations,
+            [&mut increments.k],
+            curvature,
+            of_curvature,
+            *blocks,
+            &control,
+            live,
+        ),
+        false => S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live),
+    };
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -131,7 +143,10 @@ pub fn step_by<N: Number, S: Solves>(
     }
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = S::solve(&equations, unknowns, position, *blocks, &control, live);
+    let for_x = match refined {
+        true => refinement::solve::<N, S, 2>(&equations, unknowns, position, of_position, *blocks, &control, live),
+        false => S::solve(&equations, unknowns, position, *blocks, &control, live),
+    };
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);

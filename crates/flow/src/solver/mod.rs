@@ -4,6 +4,7 @@
 
 pub mod direct;
 pub mod gauss_seidel;
+pub mod refinement;
 pub mod ring;
 pub mod sweeps;
 pub mod system;

@@ -177,13 +177,6 @@ impl<N: Number> Ring<N> {
         [m - mm, x - m, p - x, pp - p]
     }
 
-    /// Returns how far it is from the place i to those at `i-2, i-1, i+1, i+2`.
-    #[inline(always)]
-    pub fn offsets_of_places(&self, i: usize) -> [N; 4] {
-        let [mm, m, x, p, pp] = self.window(i);
-        [apart(x, mm), apart(x, m), apart(x, p), apart(x, pp)]
-    }
-
     /// Returns how far it is to the places `i-1, i, i+1, i+2` from those before them.
     #[inline(always)]
     pub fn rises_of_places(&self, i: usize) -> [N; 4] {

@@ -27,6 +27,9 @@ pub struct Equation<N, const F: usize> {
 pub trait Equations<N, const F: usize> {
     /// Returns equation `i`.
     fn equation(&self, i: usize) -> Equation<N, F>;
+
+    /// Returns row `i` times an unknown, by differences of differences: nothing is lost where it is smooth.
+    fn applied(&self, i: usize, unknown: &Ring<N>) -> N;
 }
 
 /// Row i: an equation divided by its diagonal entry, `a·u_{i-2} + b·u_{i-1} + u_i + d·u_{i+1} + e·u_{i+2} = rhs`.
@@ -110,6 +113,11 @@ impl<N: Number, const F: usize> Equations<N, F> for System<N, F> {
         let rhs = std::array::from_fn(|f| self.rhs[f][i]);
         Equation { a, b, c: N::of(1.0), d, e, rhs, time_over_length: weight }
     }
+
+    #[inline(always)]
+    fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
+        -self.rows[i].residual(N::of(0.0), unknown.window(i))
+    }
 }
 
 #[cfg(test)]
@@ -126,6 +134,12 @@ pub(crate) mod tests {
             let rhs = [(0.3 * i as f64).sin(), (1.1 * i as f64 + 0.5).cos()];
             let (b, d) = (-4.0 * s + skew, -4.0 * s - skew);
             Equation { a: s, b, c: 1.0 + 6.0 * s, d, e: s, rhs, time_over_length: 1.0 }
+        }
+
+        fn applied(&self, i: usize, unknown: &Ring<f64>) -> f64 {
+            let Equation { a, b, c, d, e, .. } = self.equation(i);
+            let [mm, m, u, p, pp] = unknown.window(i);
+            a * mm + b * m + c * u + d * p + e * pp
         }
     }
 
