@@ -5,6 +5,8 @@ const LEAST_ORDER = 2u;
 const SHARED_PARTS = 3u;
 /// Weight of an error of the nodes over one of the curvature, both relative.
 const NODE_WEIGHT = 20.0;
+/// Rounding of a step in short numbers, in units of ε.
+const NOISE = 50.0;
 
 /// The steps of the paper that a step of order `order` makes.
 fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
@@ -124,6 +126,11 @@ fn gaps_of_attempt() -> LargestGaps {
     let own = max(bounded_abs(load_field(NODE_GAPS)), bounded_abs(load_field(NODE_GAPS + 1u)));
     let lower = max(bounded_abs(load_field(NODE_GAPS + 2u)), bounded_abs(load_field(NODE_GAPS + 3u)));
     return LargestGaps(fields, ring_maxima(vec(block_max(own), block_max(lower), 0.0, 0.0)));
+}
+
+/// The tolerance of a step whose solves are refined, or the rounding of its parts if that is larger.
+fn tolerance() -> real {
+    return max(all_parameters[member].adaptive, real(NOISE * EPSILON));
 }
 
 /// The errors of order J-1 and J-2, of the new curve, which is observed.

@@ -13,11 +13,6 @@ fn bounded_abs(v: vec) -> vec {
     return select(vec(2.0 * BIG), abs(v), abs(v) <= vec(BIG));
 }
 
-/// A number without all but its leading eight binary digits, if numbers are short.
-fn coarse(value: real) -> real {
-    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff0000u));
-}
-
 /// Halvings and terms of the logarithm.
 const LN_HALVINGS = 64u;
 const LN_TERMS = 10u;
@@ -48,6 +43,11 @@ fn exponential(v: vec) -> vec {
 fn twice_sin_atan(v: vec) -> vec {
     let t = min(max(v, vec(-1e9)), vec(1e9));
     return real(2.0) * (t / sqrt(vec(1.0) + t * t));
+}
+
+/// A number without all but its leading eight binary digits, if numbers are short.
+fn coarse(value: real) -> real {
+    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff0000u));
 }
 
 /// ln(b/a) of positive numbers; WGSL has no logarithm in f64.

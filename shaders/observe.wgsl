@@ -91,7 +91,7 @@ fn regular_near(length: real) -> Regular {
 }
 
 /// The distance from equilibrium by the sums over what edges and `x_{i-1} × x_i` exceed those of the polygon by.
-fn excess_over(regular: Regular, longer: real, more: real) -> real {
+fn excess(regular: Regular, longer: real, more: real) -> real {
     let plain = quotient(total_tension(), sums.y) - all_parameters[member].polygon_ratio;
     if !IS_SHORT || CRYSTAL { return plain; }
     let by = longer / (real(NODES) * regular.edge);
@@ -205,7 +205,7 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     }
     extremes = all.extremes;
     others = all.others;
-    distance = excess_over(regular, all.sums.x, all.sums.y);
+    distance = excess(regular, all.sums.x, all.sums.y);
 }
 
 /// Derives the observables from the last `observe`.

@@ -7,7 +7,6 @@ const AFTER_FAILURE = 0.25;
 const AFTER_REFUSAL = 0.7;
 const AFTER_REFUSALS = 0.3;
 const ROUNDING = 8.0;
-const NOISE = 50.0;
 const FALLS = 0.8;
 const RISES = 0.9;
 const MIN_STEP = 1e-12;
@@ -62,11 +61,6 @@ fn is_at_goal() -> bool {
     let p = &all_parameters[member];
     let report = &all_reports[member].report;
     return (p.goal_high - report.progress.time_high) + (p.goal_low - report.progress.time_low) <= real(0.0);
-}
-
-/// The tolerance of a step whose solves are refined, or the rounding of its parts if that is larger.
-fn tolerance() -> real {
-    return max(all_parameters[member].adaptive, real(NOISE * EPSILON));
 }
 
 /// The largest error of a step of length h of a curve of length `length`: an error below the rounding of the solves says

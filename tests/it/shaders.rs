@@ -22,6 +22,7 @@ use curvelax::{
     solver::{
         Blocks, Solver,
         gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
+        refinement,
     },
 };
 use naga::{
@@ -336,7 +337,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("AFTER_REFUSAL", pace::AFTER_REFUSAL),
         ("AFTER_REFUSALS", pace::AFTER_REFUSALS),
         ("ROUNDING", pace::ROUNDING),
-        ("NOISE", pace::NOISE),
+        ("NOISE", extrapolation::NOISE),
         ("ONCE", refinement::ONCE as f64),
         ("FALLS", pace::FALLS),
         ("RISES", pace::RISES),
@@ -376,8 +377,10 @@ fn the_constants_of_shaders_and_host_are_equal() {
     for (name, value) in table {
         assert_eq!(constant(name), value, "{name}");
     }
-    // The status of a solve, or of the loop over steps, inside the kernel; the host never sees it.
+    // What a variant is, and the status of a solve, or of the loop over steps, inside the kernel; the host never sees it.
     let of_the_kernel = [
+        "IS_SHORT",
+        "REFINED",
         "UNSOLVED",
         "SOLVED",
         "NOT_FINITE",

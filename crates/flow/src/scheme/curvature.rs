@@ -52,21 +52,21 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let d = -(half * alpha) - (middle + high + e);
         let c = (r * self.rate - rkb) - (a + b + d + e);
         let forcing = rise_of_bp * iq - rise_of_b * iqm;
-        let stiff = self.stiff(i, self.old.k.rises(i));
+        let stiff = self.stiff_curvature(i, self.old.k.rises(i));
         Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.tau * ir }
     }
 
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
         let own = self.new.r[i] * self.rate - self.motion.rkb[i];
-        own * unknown[i] + self.stiff(i, unknown.rises(i))
+        own * unknown[i] + self.stiff_curvature(i, unknown.rises(i))
     }
 }
 
 impl<N: Number> Curvature<'_, N> {
     /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
     #[inline(always)]
-    fn stiff(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
+    fn stiff_curvature(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);

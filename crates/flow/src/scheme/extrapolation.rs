@@ -16,7 +16,6 @@
 
 use super::{
     Branches, Curve, Parameters, State,
-    pace::{self, NOISE},
     run::Run,
     state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from},
 };
@@ -35,6 +34,10 @@ pub const MOST_ORDER_F32: u32 = 4;
 /// Weight of an error of the nodes over one of the curvature, both relative. A mode m of the curve has m²-1 times as much of it
 /// in the curvature.
 pub const NODE_WEIGHT: f64 = 20.0;
+
+/// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of the
+/// rows multiply it.
+pub const NOISE: f64 = 50.0;
 
 /// The last parts of a row, which go into the combinations.
 pub const SHARED_PARTS: u32 = 3;
@@ -218,6 +221,12 @@ pub fn finish_attempt<N: Number>(state: &mut State<N>, new: &mut Curve<N>) {
     bend_before.close();
 }
 
+/// Returns the tolerance of a step whose solves are refined, or the rounding of its parts if that is larger.
+#[inline(always)]
+pub fn tolerance<N: Number>(p: &Parameters<N>) -> N {
+    p.adaptive.max(N::of(NOISE * N::EPSILON))
+}
+
 /// The errors of order J-1 and J-2, in k and in ln r, of the step that ends in `new`.
 ///
 /// The error in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is negligible, it
@@ -251,7 +260,7 @@ pub fn errors_of_attempt<N: Number>(
     let mut scale = N::select(followed, (size * spread).sqrt(), size);
     if N::IS_SHORT {
         // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
-        scale = scale.max(size * (N::of(NOISE * N::EPSILON) / pace::tolerance(p)));
+        scale = scale.max(size * (N::of(NOISE * N::EPSILON) / tolerance(p)));
     }
     let errors = [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)];
     if !branches.geometric {

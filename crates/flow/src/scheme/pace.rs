@@ -7,10 +7,10 @@
 
 use super::{
     Parameters,
-    extrapolation::{LEAST_ORDER, parts},
+    extrapolation::{LEAST_ORDER, parts, tolerance},
     member::Progress,
 };
-use crate::number::{Number, Real, ln_ratio};
+use crate::number::{Real, ln_ratio};
 
 /// Fraction taken of the step length that is predicted to meet the tolerance.
 pub const SAFETY: f64 = 0.9;
@@ -26,9 +26,6 @@ pub const AFTER_REFUSAL: f64 = 0.7;
 pub const AFTER_REFUSALS: f64 = 0.3;
 /// Rounding of a step of the lowest order, in units of ε and of the root of the largest weight of its systems.
 pub const ROUNDING: f64 = 8.0;
-/// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of the
-/// rows multiply it.
-pub const NOISE: f64 = 50.0;
 /// The order falls where the lower one makes the same progress for this fraction of the work.
 pub const FALLS: f64 = 0.8;
 /// The order rises where the lower one makes the same progress for no less than this multiple of the work.
@@ -118,12 +115,6 @@ pub fn allowed<T: Real>(h: T, length: T, n: T, p: &Parameters<T>, refined: bool)
     }
     let edge = length / n;
     (T::of(4.0 * ROUNDING * T::EPSILON) * (h.sqrt() / (edge * edge))).max(p.adaptive)
-}
-
-/// Returns the tolerance of a step whose solves are refined, or the rounding of its parts if that is larger.
-#[inline(always)]
-pub fn tolerance<N: Number>(p: &Parameters<N>) -> N {
-    p.adaptive.max(N::of(NOISE * N::EPSILON))
 }
 
 /// Returns the ratio of the next step to one of order `order` with error `error`, which scales with that power of the

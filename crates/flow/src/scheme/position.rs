@@ -49,7 +49,10 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
         let c = q * self.rate - (a + b + d + e);
         let rhs = match self.geometric {
             true => forces::of_polygon(self.old, self.motion, i),
-            false => [-self.stiff(i, self.old.x.rises_of_places(i)), -self.stiff(i, self.old.y.rises_of_places(i))],
+            false => [
+                -self.stiff_position(i, self.old.x.rises_of_places(i)),
+                -self.stiff_position(i, self.old.y.rises_of_places(i)),
+            ],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
     }
@@ -57,14 +60,14 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
         let [_, _, r, rp, _] = self.new.r.window(i);
-        (r + rp) * N::of(0.5) * self.rate * unknown[i] + self.stiff(i, unknown.rises(i))
+        (r + rp) * N::of(0.5) * self.rate * unknown[i] + self.stiff_position(i, unknown.rises(i))
     }
 }
 
 impl<N: Number> Position<'_, N> {
     /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
     #[inline(always)]
-    fn stiff(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
+    fn stiff_position(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
         let [_, _, k, kp, _] = self.new.k.window(i);
         let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
         let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
