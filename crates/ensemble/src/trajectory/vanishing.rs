@@ -17,8 +17,10 @@ use curvelax_flow::{
     scheme::{Parameters, member::Observed},
 };
 
-/// Share of the length of a curve at which it ends: its events and snapshots until then are those of the run.
-const LEFT: f64 = 0.02;
+/// Share of the length of a curve at which it ends; that of a crystal, whose edges grow apart on the way. Events and snapshots
+/// until then are found.
+const LEFT: f64 = 0.1;
+const CRYSTAL_LEFT: f64 = 0.25;
 /// The part of the life of a curve after which steps end.
 const PART: f64 = 0.5;
 
@@ -46,7 +48,8 @@ impl Vanishing {
     ) -> Option<Vanishing> {
         let may = forcing.drive.is_some() && start.turning.abs() == 1;
         may.then(|| {
-            let level = precision.rounded(LEFT * start.length / unit);
+            let left = if flow.is_crystal() { CRYSTAL_LEFT } else { LEFT };
+            let level = precision.rounded(left * start.length / unit);
             let outer = (PI / points as f64).cos().recip();
             let mut own = Vanishing { flow, forcing, outer, level, until: 0.0 };
             own.look_ahead(0.0, start, unit);
@@ -87,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_driven_simple_curve_pauses_at_a_fiftieth_of_its_length() {
+    fn a_driven_simple_curve_pauses_at_a_tenth_of_its_length() {
         let start = Observables { length: 8.0, area: 4.0, turning: 1, ..Observables::default() };
         let of = |drive: Option<&str>, start: &Observables| {
             let forcing = Forcing { drive: drive.map(|drive| drive.parse().unwrap()), ..Forcing::default() };
@@ -96,7 +99,7 @@ mod tests {
         let own = of(Some("0.5"), &start).unwrap();
         let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
         own.aim(&mut parameters);
-        assert_eq!((parameters.watched, parameters.low_length), (1.0, f64::from(0.08_f32)));
+        assert_eq!((parameters.watched, parameters.low_length), (1.0, f64::from(0.4_f32)));
         // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of 2.
         assert!((own.until - 2_f64.sqrt() / 16.0).abs() < 1e-12);
         // An event at a longer length comes first.
@@ -104,7 +107,7 @@ mod tests {
         own.aim(&mut parameters);
         assert_eq!(parameters.low_length, 3.0);
         let at = |length| Observed { length, ..Observed::default() };
-        assert!(own.is_due(&at(0.07)) && !own.is_due(&at(0.09)));
+        assert!(own.is_due(&at(0.3)) && !own.is_due(&at(0.5)));
         let radius = 0.7_f64;
         let (length, area) = (4.0 * 2_f64.sqrt() * radius, 2.0 * radius * radius);
         let left = own.left(&Observables { length, area, ..start }).unwrap();
