@@ -12,8 +12,8 @@ class Keys(TypedDict, total=False):
     """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
 
     curves: int
-    """Number of members. Of outlines, the number of copies of each; without the flag, each runs once, unperturbed. By
-    default 256."""
+    """Number of members. Of outlines, the number of copies of each, perturbed by amplitude; of files:PATTERN without
+    the flag, each runs once, unperturbed. By default 256."""
 
     outlines: int
     """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
@@ -140,8 +140,8 @@ class Keys(TypedDict, total=False):
     Use it for rough outlines. By default off."""
 
     stop_when_relaxed: bool
-    """End a member as soon as it is relaxed. By default false; with t-end auto true, unless it is driven to
-    vanish."""
+    """End a member as soon as it is relaxed; one that drive shrinks to a point ends there. By default false; with
+    t-end auto true."""
 
     accurate: bool
     """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine.

@@ -23,9 +23,10 @@ fn a_driven_circle_vanishes_at_its_radius_over_the_force() {
         let (t, end) = (number(&row, "t_vanish"), number(&row, "t_end"));
         assert_eq!(row["status"], "vanished", "{flags}");
         assert!((t * force / radius - 1.0).abs() < 2e-4, "{flags}: {t}");
-        // It was followed to a quarter of its length, and not much beyond.
+        // It was followed to a tenth of its length, a crystal to a quarter, and not much beyond.
         let left = number(&row, "length_end") / number(&row, "length_start");
-        assert!(end < t && (0.1..=0.25).contains(&left), "{flags}: {end} {left}");
+        let level = if flags.contains("energy") { 0.25 } else { 0.1 };
+        assert!(end < t && (0.4 * level..=level).contains(&left), "{flags}: {end} {left}");
     }
 }
 
@@ -101,15 +102,53 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
 }
 
 #[test]
+fn each_member_ends_where_its_own_force_takes_it() {
+    let done = run("--drive uniform(-1..1) --curves 8 --adaptive --pull auto --t-end auto --points 64");
+    let forces = column(&done.rows("members.csv"), "drive_1");
+    let rows = done.summary();
+    for (row, force) in rows.iter().zip(&forces) {
+        let expected = if *force > 0.0 { "vanished" } else { "relaxed" };
+        assert_eq!((&*row["status"], row["t_vanish"].is_empty()), (expected, *force <= 0.0), "{force}");
+    }
+    assert!(forces.iter().any(|force| *force > 0.0) && forces.iter().any(|force| *force < 0.0));
+}
+
+#[test]
+fn a_slow_force_takes_few_steps_and_a_driven_member_that_fails_is_not_at_rest() {
+    let row = one("--shape circle:1 --drive 1e-3 --t-end auto");
+    assert!(row["status"] == "vanished" && number(&row, "steps") < 300.0, "{} {}", row["status"], row["steps"]);
+    let row = one("--shape circle:1 --drive 1 --t-end 0.95");
+    assert!((number(&row, "length_end") / (2.0 * PI * 0.05) - 1.0).abs() < 2e-3 && number(&row, "steps") < 1000.0);
+    // No step is short enough for this force.
+    let done =
+        run("--shape circle:1 --amplitude 0 --curves 1 --adaptive --pull auto --t-end auto --sweep drive=1,1e20");
+    let statuses: Vec<String> = done.summary().iter().map(|row| row["status"].to_string()).collect();
+    assert_eq!(statuses[0], "vanished");
+    assert!(["singular", "stalled", "nonfinite"].contains(&&*statuses[1]), "{statuses:?}");
+}
+
+#[test]
+fn events_late_in_the_life_of_a_circle_are_seen() {
+    let events = "--event short=length<=0.2*start --event bent=k_max>=5 --event tiny=area<=0.03*start";
+    let done =
+        run(&format!("--shape circle:1 --drive 1 --amplitude 0 --curves 1 --adaptive --pull auto --t-end 2 {events}"));
+    let times = column(&done.rows("events.csv"), "t");
+    let exact = [0.8, 0.8, 1.0 - f64::sqrt(0.03)];
+    let off = times.iter().zip(exact).map(|(t, exact)| (t - exact).abs()).fold(0.0, f64::max);
+    assert!(times.len() == 3 && off < 1e-3, "{times:?}");
+}
+
+#[test]
 fn members_that_vanish_before_they_relax_are_censored_then() {
-    let drive = "--drive uniform(4..20)";
-    let done = run(&format!("--shape ellipse:2,1 {drive} --curves 8 --adaptive --pull auto --t-end auto --points 64"));
+    // An excess of 1e-9 is reached by none, since the mesh of a curve that shrinks is not that even.
+    let common = "--shape ellipse:2,1 --curves 8 --adaptive --pull auto --t-end auto --points 64";
+    let done = run(&format!("{common} --drive uniform(4..20) --sweep relax-to=0.01,1e-8"));
     let rows = done.summary();
     assert!(rows.iter().all(|row| row["status"] == "vanished"));
-    let (early, relaxed): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|row| row["t_relax"].is_empty());
-    assert!(early.len() > 1 && relaxed.len() > 1, "{} {}", early.len(), relaxed.len());
-    let cell = &done.rows("ensemble.csv")[0];
-    assert_eq!(number(cell, "t_relax_known"), relaxed.len() as f64);
+    let relaxed = [0, 1].map(|cell| rows[8 * cell..][..8].iter().filter(|row| !row["t_relax"].is_empty()).count());
+    assert_eq!(relaxed, [8, 0]);
+    let known = column(&done.rows("ensemble.csv"), "t_relax_known");
+    assert_eq!(known, [8.0, 0.0]);
 }
 
 #[test]

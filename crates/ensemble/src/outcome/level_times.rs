@@ -57,6 +57,10 @@ impl Ladder {
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
         let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
         let (turn, excess) = (turn(spec, finest), spec.threshold(finest.excess));
+        // The error of the steps is relative to the root of the excess, and a circle has none.
+        if excess <= 0.0 {
+            return None;
+        }
         let tolerance = tolerance(spec);
         Some(Limit::of(&Times { own, levels: times, points, own_level, tolerance, is_adaptive, turn, excess }))
     }
