@@ -47,7 +47,7 @@ pub enum StartCurve {
     },
     /// `r = 1 + a·cos mθ` with a small a that depends on the precision.
     Mode(u32),
-    /// The Wulff shape of [`CRYSTAL`] with a small wave that keeps its form.
+    /// The Wulff shape of `CRYSTAL` with a small wave that keeps its form.
     Wulff,
     /// `(2 cos 2πu, sin 2πu)`.
     Ellipse,
