@@ -45,8 +45,8 @@ fn act(k: vec, r: vec, beta: vec) -> vec {
 /// Increments of x and y.
 struct Moves { x: vec, y: vec }
 
-/// Adds a time tau of the force, along the inward normals of circles through the old nodes, to the increments of x and y; moves the nodes of
-/// the new curve.
+/// Adds a time tau of the force, along the inward normals of circles through the old nodes, to the increments of x and y;
+/// moves the nodes of the new curve.
 fn push(x: vec, y: vec) -> Moves {
     settle();
     let old = windows(x, y);

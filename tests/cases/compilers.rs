@@ -174,12 +174,13 @@ fn nothing_is_spilled() {
     assert!(spilled.remove("control").is_some_and(|spilled| spilled > 0));
     // Mesa 22.3 fails on some in f64.
     assert_eq!(spilled.keys().filter(|name| name.contains("-f32-")).count(), 30, "{spilled:?}");
-    // In adaptive steps of crystals in f64 more values are needed at once than there are registers.
+    // In adaptive steps of crystals in f64, and in all steps of driven ones, more values are needed at once than there are registers.
     let allowed = |name: &str| match name {
         "direct-adaptive-crystal-f64-n100" => 12,
         "gauss-seidel-adaptive-crystal-f64-n100" => 22,
-        "direct-adaptive-crystal-forced-f64-n100" => 17,
-        "gauss-seidel-adaptive-crystal-forced-f64-n100" => 28,
+        "direct-adaptive-crystal-forced-f64-n100" => 24,
+        "gauss-seidel-adaptive-crystal-forced-f64-n100" => 32,
+        "gauss-seidel-crystal-forced-f64-n100" => 10,
         _ => 0,
     };
     assert!(spilled.iter().all(|(name, spilled)| *spilled <= allowed(name)), "{spilled:?}");

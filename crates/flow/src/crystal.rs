@@ -144,7 +144,7 @@ impl FromStr for Waves {
                 let problem = "is not a number M of waves: use a whole one up to";
                 return Err(format!("{} {problem} {HIGHEST_WAVE}", number(mode)));
             }
-            if !(degrees.abs() <= LARGEST_ANGLE) {
+            if degrees.abs() > LARGEST_ANGLE {
                 return Err(format!(
                     "an angle of {} degrees; use -{LARGEST_ANGLE} to {LARGEST_ANGLE}",
                     number(degrees)

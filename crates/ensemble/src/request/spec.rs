@@ -251,7 +251,7 @@ impl Spec {
     /// Whether relaxation times have limits n → ∞ that intervals hold: not where the end is known only when it is reached, nor
     /// where members are followed until they vanish, whose t_vanish has none.
     pub fn can_refine(&self) -> bool {
-        !self.keeps_both() && !(self.is_driven_inwards() || self.sweep.has("drive"))
+        !(self.keeps_both() || self.is_driven_inwards() || self.sweep.has("drive"))
     }
 
     /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ and M turns m

@@ -243,6 +243,13 @@ mod tests {
         (1..=n).map(node).collect()
     }
 
+    /// Keeps the area and the length of a polygon.
+    fn keeping_both(nodes: &[DVec2]) -> Forcing {
+        let at_start = Run::new(State::<f64>::from_nodes(nodes), Parameters::of_flow(&Flow::Willmore, 0.0)).report.now;
+        let kept = [at_start.area, at_start.length];
+        Forcing { conserved: Some(Conserved::AreaAndLength), kept, ..Forcing::default() }
+    }
+
     fn driven(drive: Drive) -> Forcing {
         Forcing { drive: Some(drive), ..Forcing::default() }
     }
@@ -313,9 +320,7 @@ mod tests {
     #[test]
     fn a_vesicle_at_rest_keeps_its_mesh() {
         let nodes = ellipse(2.0, 1.0, 50);
-        let at_start = Run::new(State::<f64>::from_nodes(&nodes), Parameters::of_flow(&Flow::Willmore, 0.0)).report.now;
-        let kept = [at_start.area, at_start.length];
-        let forcing = Forcing { conserved: Some(Conserved::AreaAndLength), kept, ..Forcing::default() };
+        let forcing = keeping_both(&nodes);
         let run = followed_by(1e-3, 17.0, &nodes, &Flow::Willmore, &forcing, 15.0);
         let (steps, now) = (run.counters.steps + run.counters.rejected, run.report.now);
         assert!(steps < 2000 && now.mesh_ratio < 1.2, "{steps} steps, mesh ratio {}", now.mesh_ratio);
@@ -324,9 +329,7 @@ mod tests {
     #[test]
     fn a_circle_whose_area_and_length_are_kept_rests() {
         let nodes = ellipse(1.0, 1.0, 50);
-        let at_start = Run::new(State::<f64>::from_nodes(&nodes), Parameters::of_flow(&Flow::Willmore, 0.0)).report.now;
-        let kept = [at_start.area, at_start.length];
-        let forcing = Forcing { conserved: Some(Conserved::AreaAndLength), kept, ..Forcing::default() };
+        let forcing = keeping_both(&nodes);
         let run = followed(&nodes, &Flow::Willmore, &forcing, 1.0);
         let moved = run.state.curve.positions().zip(&nodes).map(|(now, then)| now.distance(*then)).fold(0.0, f64::max);
         assert!(run.counters.status == 0 && moved < 1e-6, "{} {moved:e}", run.counters.status);

@@ -47,7 +47,7 @@ pub enum StartCurve {
     },
     /// `r = 1 + a·cos mθ` with a small a that depends on the precision.
     Mode(u32),
-    /// The Wulff shape of [`CRYSTAL`] with a small wave that keeps its form.
+    /// The Wulff shape of `CRYSTAL` with a small wave that keeps its form.
     Wulff,
     /// `(2 cos 2πu, sin 2πu)`.
     Ellipse,
@@ -387,7 +387,7 @@ fn driven() -> [Problem; 2] {
         exact: decay,
         mistaken: m2 * (m2 - 1.0) * t_end,
         mistake: "a circle that does not grow",
-        bound: ErrorBound { space: 6.5e-3, time: 1.5e-2, single: 4e-3 },
+        bound: ErrorBound { space: 6.5e-3, time: 2.4e-2, single: 4e-3 },
         steps: 100,
         ..circle.clone()
     };
@@ -415,8 +415,8 @@ fn kept() -> [Problem; 2] {
         }
     };
     [
-        of("area-kept-mode-2", Conserved::Area, [3.5e-3, 2.3e-2], 9.0, "the rate (m²-1)² of a kept length"),
-        of("length-kept-mode-2", Conserved::Length, [3.3e-3, 2.1e-2], 7.5, "the rate (m²-1)(m²-3/2) of a kept area"),
+        of("area-kept-mode-2", Conserved::Area, [3.5e-3, 4.5e-2], 9.0, "the rate (m²-1)² of a kept length"),
+        of("length-kept-mode-2", Conserved::Length, [3.3e-3, 3.75e-2], 7.5, "the rate (m²-1)(m²-3/2) of a kept area"),
     ]
 }
 
