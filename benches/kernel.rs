@@ -61,7 +61,7 @@ fn start<T: Real>(gpu: &Gpu, n: usize, variant: Variant) -> (Kernel<T>, f64) {
     let started = now();
     let mut kernel = Kernel::<T>::new(gpu, Blocks::new(n).unwrap(), MEMBERS, 1 << 30, variant).unwrap();
     let mut first =
-        if variant.adaptive { adaptive_members(n, 1, 1, 1e-3, T::PRECISION) } else { members(n, 1, 1, 1e-5) }.unwrap();
+        if variant.adaptive { adaptive_members(n, 1, 1, 1e-3, T::PRECISION) } else { members(n, 1, 1) }.unwrap();
     kernel.load(0, &first.remove(0)).unwrap();
     // Drivers compile at the first dispatch.
     kernel.advance().unwrap();
@@ -84,7 +84,7 @@ fn sweeps<T: Real>(kernel: Kernel<T>, n: usize, phase: u32) -> f64 {
     let mut kernel = kernel;
     for sweeps in [8, 808] {
         kernel = kernel.with_budget(Budget { steps: 1, sweeps });
-        for (slot, mut run) in members(n, MEMBERS, 1, 1e-5).unwrap().into_iter().enumerate() {
+        for (slot, mut run) in members(n, MEMBERS, 1).unwrap().into_iter().enumerate() {
             run.parameters.sor = 1e-9;
             run.counters.phase = phase;
             kernel.load(slot, &run).unwrap();
@@ -102,7 +102,7 @@ fn sweeps<T: Real>(kernel: Kernel<T>, n: usize, phase: u32) -> f64 {
 /// µs per step and curve, of the steps that were made.
 fn direct<T: Real>(kernel: Kernel<T>, n: usize) -> f64 {
     let mut kernel = kernel.with_budget(Budget { steps: 20, sweeps: 1 << 20 });
-    for (slot, mut run) in members(n, MEMBERS, 1 << 20, 1e-5).unwrap().into_iter().enumerate() {
+    for (slot, mut run) in members(n, MEMBERS, 1 << 20).unwrap().into_iter().enumerate() {
         // The conformance ensemble redistributes ever more strongly, which most members would not survive.
         run.parameters.omega = 1.0;
         kernel.load(slot, &run).unwrap();

@@ -319,7 +319,7 @@ fn a_moved_node_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcom
 }
 
 fn permutation<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let launches = members(n, 7, 20, 1e-4)?;
+    let launches = members(n, 7, 20)?;
     let order = [3, 0, 6, 2, 5, 1, 4];
     let permuted: Vec<Run<f64>> = order.iter().map(|j| launches[*j].clone()).collect();
     let plain = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(6))?;
@@ -347,7 +347,7 @@ fn same(a: &Left, b: &Left, what: &str) -> Outcome {
 }
 
 fn dispatches<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let launches = members(n, 5, 50, 1e-4)?;
+    let launches = members(n, 5, 50)?;
     let at_once = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(50))?;
     for per_dispatch in [1, 7] {
         let in_parts = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(per_dispatch))?;
@@ -417,7 +417,7 @@ fn exchanges<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     if by_shuffles.subgroup != (gpu.capacity().least_subgroup >= 8) {
         return Err(format!("{by_shuffles:?} on subgroups of {}", gpu.capacity().least_subgroup).into());
     }
-    let launches = members(n, 5, 50, 1e-4)?;
+    let launches = members(n, 5, 50)?;
     let adaptive_launches = adaptive_members(n, 5, 20, 1e-3, T::PRECISION)?;
     for (adaptive, launches) in [(false, launches), (true, adaptive_launches)] {
         let by_shuffles = Variant { adaptive, ..by_shuffles };
@@ -442,7 +442,7 @@ fn replace_nodes(run: &mut Run<f64>, change: impl FnOnce(&mut Vec<DVec2>)) {
 
 /// One member for each way to fail, at different places; the good ones must not be affected.
 fn bad_members<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let good = members(n, 8, 20, 1e-4)?;
+    let good = members(n, 8, 20)?;
     let alone = on_gpu::<T>(gpu, solver, n, &good, dispatches_of(5))?;
     let mut mixed = good.clone();
     replace_nodes(&mut mixed[1], |nodes| nodes[n / 3] = DVec2::new(f64::NAN, 0.0));
@@ -471,7 +471,7 @@ fn bad_members<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 }
 
 fn relaxation<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let mut launches = members(n, 5, 60, T::PRECISION.tolerance())?;
+    let mut launches = members(n, 5, 60)?;
     for launch in &mut launches {
         launch.counters.stop_when_relaxed = 1;
     }
@@ -510,7 +510,7 @@ fn largest<T: Evolves>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome {
     if n < 512 {
         return Err(format!("only {n} points fit").into());
     }
-    let launches = members(n, 2, 2, 1e-3)?;
+    let launches = members(n, 2, 2)?;
     for (j, Left { state, counters, .. }) in
         on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(2))?.into_iter().enumerate()
     {
@@ -545,7 +545,7 @@ fn adaptive_largest<T: Evolves>(gpu: &Gpu, solver: Solver, _: usize) -> Outcome 
 /// Positions within 5·10⁻⁴ (f32) and 10⁻⁵ (f64) of the direct f64 solution on the CPU: the tolerances' errors.
 fn paper<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let node = |i: usize| DVec2::from_angle(std::f64::consts::TAU * i as f64 / n as f64) * DVec2::new(2.0, 1.0);
-    let mut launch = members(n, 1, 2000, T::PRECISION.tolerance())?.remove(0);
+    let mut launch = members(n, 1, 2000)?.remove(0);
     replace_nodes(&mut launch, |nodes| *nodes = (1..=n).map(node).collect());
     launch.parameters.tau = 1e-3;
     let mut exact = launch.clone();

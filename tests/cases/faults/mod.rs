@@ -158,7 +158,7 @@ fn launches<T: Evolves>(count: usize, adaptive: bool) -> curvelax::Result<Vec<Ru
     let few = 13;
     let some = match adaptive {
         true => adaptive_members(POINTS, few, 40, 1e-3, T::PRECISION)?,
-        false => members(POINTS, few, 4, 1e-4)?,
+        false => members(POINTS, few, 4)?,
     };
     let member = |j: usize| {
         let mut run = some[j % few].clone();
@@ -284,7 +284,7 @@ fn busy(gpu: &Gpu, count: usize, sweeps: u32) -> Result<Kernel<f32>, Failed> {
     let kernel = Kernel::<f32>::in_batches(gpu, blocks, [1, count], 1 << 30, variant)?;
     // Only the device decides how long a dispatch takes.
     let mut kernel = kernel.with_budget(Budget { steps: 1 << 20, sweeps }).with_limit(HANGS);
-    for (slot, launch) in members(64, 3, 1 << 20, 1e-4)?.iter().cycle().take(kernel.slots()).enumerate() {
+    for (slot, launch) in members(64, 3, 1 << 20)?.iter().cycle().take(kernel.slots()).enumerate() {
         kernel.load(slot, launch)?;
     }
     Ok(kernel)
@@ -307,7 +307,7 @@ fn lost_between_dispatches(gpu: &Gpu) -> Outcome {
     named(kernel.advance(), gpu, "the device was lost")?;
     // The same holds for all later requests.
     named(kernel.advance(), gpu, "the device was lost")?;
-    named(kernel.load(1, &members(64, 1, 9, 1e-4)?[0]), gpu, "the device was lost")?;
+    named(kernel.load(1, &members(64, 1, 9)?[0]), gpu, "the device was lost")?;
     named(kernel.state(0), gpu, "the device was lost")?;
     named(busy(gpu, 3, 64).map_err(|e| Error::Device(e.message().unwrap_or("").into())), gpu, "the device was lost")
 }

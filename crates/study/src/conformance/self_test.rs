@@ -43,7 +43,7 @@ pub fn self_test<T: Evolves>(
 ) -> Result<()> {
     let count = MEMBERS.min(backend.slots());
     let mut launches = match adaptive {
-        false => members(n, count, STEPS, T::PRECISION.tolerance())?,
+        false => members(n, count, STEPS)?,
         true => adaptive_members(n, count, STEPS, ADAPTIVE, T::PRECISION)?,
     };
     driven.change(&mut launches);

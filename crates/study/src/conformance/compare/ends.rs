@@ -40,7 +40,7 @@ pub fn runs<T: Evolves>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let launches = members(n, MEMBERS, steps, T::PRECISION.tolerance())?;
+    let launches = members(n, MEMBERS, steps)?;
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
@@ -73,7 +73,7 @@ pub fn driven<T: Evolves>(
     change: Option<fn(&mut Run<f64>)>,
 ) -> Result<Vec<ConformanceRow>> {
     let mut launches = match steps {
-        Some(steps) => members(n, MEMBERS, steps, T::PRECISION.tolerance())?,
+        Some(steps) => members(n, MEMBERS, steps)?,
         None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
     };
     driven.change(&mut launches);

@@ -46,7 +46,7 @@ pub fn events<T: Evolves>(
     tamper: Option<Tamper>,
 ) -> Result<ConformanceRow> {
     let launches = match adaptive {
-        false => members(n, MEMBERS, STEPS, T::PRECISION.tolerance())?,
+        false => members(n, MEMBERS, STEPS)?,
         true => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
     };
     let method = method(solver);

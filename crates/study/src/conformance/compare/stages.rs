@@ -39,7 +39,7 @@ pub fn stages_of<T: Evolves>(
     n: usize,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let mut launches = members(n, MEMBERS, 1, T::PRECISION.tolerance())?;
+    let mut launches = members(n, MEMBERS, 1)?;
     driven.change(&mut launches);
     let mut kernel = gpu::Kernel::<T>::new(
         adapter,
