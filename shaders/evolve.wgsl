@@ -281,7 +281,7 @@ fn aim_at_relaxation() {
     let relax_at = all_parameters[member].relax_at;
     let excess = report.now.excess;
     report.progress.aim = 0.0;
-    let resolved = real(RESOLVED) <= abs(excess * report.progress.slope);
+    let resolved = real(RESOLVED * EPSILON) <= abs(excess * report.progress.slope);
     if all_counters[member].relax_step == NEVER && resolved && !(excess <= relax_at) && !(relax_at <= real(0.0)) {
         let fall = ln_ratio(excess, relax_at);
         report.progress.aim = aim(fall, report.progress.slope, report.progress.bend, report.progress.taken);

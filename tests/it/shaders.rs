@@ -342,6 +342,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("FALLS", pace::FALLS),
         ("RISES", pace::RISES),
         ("POINTS", f64::from(decay::POINTS)),
+        ("RESOLVED", dense::RESOLVED),
+        ("RESOLVED_SHORT", dense::RESOLVED_SHORT),
         ("BISECTIONS", f64::from(dense::BISECTIONS)),
         ("EARLY_LOOK", dense::LOOKS[0]),
         ("LATE_LOOK", dense::LOOKS[1]),

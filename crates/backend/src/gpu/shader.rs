@@ -2,7 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
-    scheme::{dense::resolved, observe::apothem},
+    scheme::observe::apothem,
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -104,9 +104,8 @@ fn of_solver(solver: Solver) -> &'static [ShaderPart] {
 pub fn source<T: Real>(variant: Variant) -> String {
     let Variant { solver, adaptive, watched, geometric, crystal, forced, .. } = variant;
     let (number, epsilon, root, sweeps) = (T::NAME, T::EPSILON, T::EPSILON.sqrt(), solver.sweeps());
-    let resolved = resolved::<T>();
     let mut text = format!(
-        "alias real = {number}; const EPSILON = {epsilon:e}; const ROOT_EPSILON = {root:e}; const RESOLVED = {resolved:e}; \
+        "alias real = {number}; const EPSILON = {epsilon:e}; const ROOT_EPSILON = {root:e}; \
          const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; const WATCHED = {watched}; \
          const GEOMETRIC = {geometric}; const CRYSTAL = {crystal}; const FORCED = {forced};\n"
     );

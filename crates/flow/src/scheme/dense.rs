@@ -6,11 +6,12 @@ use crate::number::{
     place::{coordinate, placed},
 };
 
-/// The excess below which its derivatives are mostly rounding: their weights amplify it a thousand times. The excess itself
-/// is off by some ε where it is a small difference of numbers near 1, and by a tenth of that in f32, where it is not.
-pub const fn resolved<N: Number>() -> f64 {
-    if N::IS_SHORT { 8192.0 * N::EPSILON } else { 131_072.0 * N::EPSILON }
-}
+/// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
+/// and the excess is a small difference of numbers near 1.
+pub const RESOLVED: f64 = 131_072.0;
+/// The same inside steps in short numbers, whose excess is not that difference. Lengths of steps do not follow from such
+/// derivatives: two machines would make other ones.
+pub const RESOLVED_SHORT: f64 = 8192.0;
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;
 
@@ -223,7 +224,8 @@ impl<T: Real> Fall<T> {
             let ratio = h / progress.taken;
             Arc { start: Jet::scaled(zero, progress.slope, progress.bend, ratio), end }
         };
-        let resolved = T::of(resolved::<T>()).le(after);
+        let multiple = if T::IS_SHORT { RESOLVED_SHORT } else { RESOLVED };
+        let resolved = T::of(multiple * T::EPSILON).le(after);
         if resolved && arc.is_tame() { Fall::Smooth(arc) } else { Fall::Exponential(fallen) }
     }
 }

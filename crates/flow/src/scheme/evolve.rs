@@ -6,7 +6,7 @@
 
 use super::{
     Branches, Parameters, State, Status, Workspace, decay,
-    dense::{Arc, Fall, LOOKS, Taken, resolved},
+    dense::{Arc, Fall, LOOKS, RESOLVED, Taken},
     extrapolation::{self, AllShares, SHARED_PARTS},
     forcing,
     member::{Counters, NEVER, Observed},
@@ -555,7 +555,7 @@ fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
-    let resolved = T::of(resolved::<T>()).le((excess * progress.slope).abs());
+    let resolved = T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
     if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
         progress.aim = pace::aim(ln_ratio(excess, p.relax_at), progress.slope, progress.bend, progress.taken);
     }
