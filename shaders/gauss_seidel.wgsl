@@ -17,7 +17,7 @@ fn solve_one(negligible: real, made: u32, most: u32) -> Solve {
     start_sweeps();
     let size = system_size(rhs_x);
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
-    let tolerance = max(p.tolerance, real(EPSILON) * size);
+    let tolerance = max(p.tolerance, real(FLOOR * EPSILON) * size);
     var ended = finite_or_not(size);
     var sweeps = made;
     var left = most;
@@ -39,7 +39,7 @@ fn solve_two(negligible: real, made: u32, most: u32) -> Solve {
     start_sweeps();
     let size = system_size(max(bounded_abs(rhs_x), bounded_abs(rhs_y)));
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
-    let tolerance = max(p.tolerance, real(EPSILON) * size);
+    let tolerance = max(p.tolerance, real(FLOOR * EPSILON) * size);
     var ended = finite_or_not(size);
     var sweeps = made;
     var left = most;

@@ -25,8 +25,10 @@ fn paused_or(ended: u32, sweeps: u32) -> Solve {
     return Solve(select(PAUSED, ended, is_over), sweeps);
 }
 
-/// Largest scaled row sum; more than BIG if an entry or a right-hand side is not finite. Times EPSILON it is the
-/// tolerance below which a scaled residual is rounding error.
+/// Tolerance below which a scaled residual is rounding error, in units of EPSILON times the size of the system.
+const FLOOR = 2.0;
+
+/// Largest scaled row sum; more than BIG if an entry or a right-hand side is not finite.
 fn system_size(rhs: vec) -> real {
     let terms = vec(1.0) + abs(row_of.a) + abs(row_of.b) + abs(row_of.d) + abs(row_of.e);
     let finite = bounded_abs(rhs) <= vec(BIG);

@@ -22,7 +22,7 @@ use curvelax::{
     solver::{
         Blocks, Solver,
         gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
-        refinement,
+        refinement, sweeps,
     },
 };
 use naga::{
@@ -350,6 +350,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
         ("AUTO_SCALE", AUTO_SCALE),
+        ("FLOOR", sweeps::FLOOR),
         ("NEVER", f64::from(NEVER)),
         ("RUNNING", 0.0),
         ("RELAXED", f64::from(Status::Relaxed as u32)),

@@ -97,6 +97,8 @@ kinds! {
     signed of i32, "integer": |v| Field::Signed(i64::from(*v)), |fields| fields.whole();
     /// How a member ended.
     status of curvelax_ensemble::Status, "word": |v| Field::Word(v.name()), |fields| fields.status();
+    /// The numbers in which a member was computed.
+    precision of curvelax_flow::number::Precision, "word": |v| Field::Word(v.name()), |fields| fields.precision();
     /// A count or an index, or none.
     rank of Option<u64>, "integer": |v| v.map_or(Field::Float(None), Field::Whole), |fields| fields.whole_or_none();
     /// Any word.

@@ -7,6 +7,7 @@ use csv::StringRecord;
 use super::names::REMEDY;
 use curvelax_base::error::{Error, Result, shortened};
 use curvelax_ensemble::Status;
+use curvelax_flow::number::Precision;
 
 /// Characters of foreign text in a message.
 const SHOWN: usize = 200;
@@ -66,6 +67,13 @@ impl Fields<'_> {
         let word = self.word();
         let status = Status::ALL.into_iter().find(|status| status.name() == word);
         status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
+    }
+
+    /// The name of a precision.
+    pub fn precision(&mut self) -> Result<Precision> {
+        let (word, all) = (self.word(), [Precision::F32, Precision::F64]);
+        let precision = all.into_iter().find(|precision| precision.name() == word);
+        precision.ok_or_else(|| self.unexpected(&all.map(Precision::name).join(", ")))
     }
 
     /// A float; none if unknown.

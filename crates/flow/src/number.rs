@@ -206,12 +206,13 @@ pub trait Real:
 }
 
 /// The number type of the state and of all arithmetic on it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Precision {
     /// Single precision.
     F32,
     /// Double precision.
+    #[default]
     F64,
 }
 

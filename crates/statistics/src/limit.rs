@@ -26,6 +26,8 @@ const SMALL: f64 = 5e-5;
 const OF_SPACE: f64 = 1.25;
 /// The same where terms do not fall yet, with θ ≤ 1 in place of θ².
 const OF_OPEN: f64 = 1.25;
+/// Differences that are as small as so many errors of rounding have no order, either.
+const OF_NOISE: f64 = 2.0;
 /// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
 const OF_FALL: f64 = 1.5;
 /// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units of
@@ -62,6 +64,8 @@ pub struct Times {
     pub levels: Vec<f64>,
     /// These numbers.
     pub points: Vec<usize>,
+    /// By how much rounding moves each, relative to it; nothing in double precision.
+    pub rounding: Vec<f64>,
     /// Which of them is that of `own`.
     pub own_level: usize,
     /// Tolerance of these steps.
@@ -81,7 +85,7 @@ pub struct Limit {
     pub t: f64,
     /// Half-width of its 95 % interval.
     pub error: f64,
-    /// The part of it that no nodes or steps lessen; none of what [`Limit::of`] estimates.
+    /// The part of it that no nodes or steps lessen, such as rounding.
     pub fixed: f64,
     /// Observed order in 1/n, if the differences have one.
     pub order: Option<f64>,
@@ -100,9 +104,9 @@ impl Limit {
     ///
     /// let points = [50, 71, 100];
     /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
-    /// let points = points.map(|n| n as usize).to_vec();
+    /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
     /// let (own, own_level, tolerance, is_adaptive) = (0.804, 2, 1e-4, true);
-    /// let times = Times { own, levels, points, own_level, tolerance, is_adaptive, turn: 0.2, excess: 2e-3 };
+    /// let times = Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn: 0.2, excess: 2e-3 };
     /// let limit = Limit::of(&times);
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
@@ -111,14 +115,16 @@ impl Limit {
     /// # Panics
     /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
-        let Times { own, ref levels, ref points, own_level, tolerance, is_adaptive, turn, excess } = *times;
+        let Times { own, ref levels, ref points, ref rounding, own_level, tolerance, is_adaptive, turn, excess } =
+            *times;
         let finest = points[points.len() - 1];
         let three = |from: usize| {
-            let points = [0, 1, 2].map(|i| points[from + i]);
-            OfSpace::of([0, 1, 2].map(|i| levels[from + i]), points, turn * finest as f64 / points[2] as f64)
+            let at = [0, 1, 2].map(|i| from + i);
+            let (points, rounding) = (at.map(|i| points[i]), at.map(|i| rounding[i] * levels[i]));
+            OfSpace::of(at.map(|i| levels[i]), points, rounding, turn * finest as f64 / points[2] as f64)
         };
         let mut of_space = (0..levels.len() - 2).rev().map(three);
-        let OfSpace { t, error, order, asymptotic } = of_space.next().expect("three levels");
+        let OfSpace { t, error, rounding, order, asymptotic } = of_space.next().expect("three levels");
         let fall = if asymptotic { FALL } else { OPEN_FALL };
         // What is small at the finest levels alone may be so by chance.
         let scales = std::iter::successors(Some(1.0 / fall), |scale| Some(scale / fall));
@@ -126,8 +132,9 @@ impl Limit {
         let full = levels[levels.len() - 1];
         let change = if is_adaptive { own - levels[own_level] } else { 0.0 };
         let t = t - change / (FINER_STEPS - 1.0);
-        let error = error.hypot(OF_STEPS * change).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt());
-        Limit { t, error, fixed: 0.0, order, asymptotic, relative: own / t - 1.0 }
+        let error =
+            error.hypot(OF_STEPS * change).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt()).hypot(rounding);
+        Limit { t, error, fixed: rounding, order, asymptotic, relative: own / t - 1.0 }
     }
 
     /// Whether its differences do not fall as they should, and it is not known to a thousandth.
@@ -153,34 +160,41 @@ impl Limit {
 struct OfSpace {
     t: f64,
     error: f64,
+    /// By how much rounding moves it.
+    rounding: f64,
     order: Option<f64>,
     asymptotic: bool,
 }
 
 impl OfSpace {
-    /// Extrapolates from three levels, the finest last, where the tangent turns by `turn` at a node.
-    fn of([half, between, full]: [f64; 3], points: [usize; 3], turn: f64) -> OfSpace {
+    /// Extrapolates from three levels, the finest last, which `rounding` moves, where the tangent turns by `turn` at a node.
+    fn of([half, between, full]: [f64; 3], points: [usize; 3], rounding: [f64; 3], turn: f64) -> OfSpace {
         // (n/n')²: how much larger the leading error is.
         let [p, q] = [points[0], points[1]].map(|n| (points[2] as f64 / n as f64).powi(2));
         let two = full - (between - full) / (q - 1.0);
         // Lagrange's weights at 0 for the abscissas p, q and 1.
         let three = half * q / ((p - q) * (p - 1.0)) - between * p / ((p - q) * (q - 1.0))
             + full * p * q / ((p - 1.0) * (q - 1.0));
+        let of_three = [q / ((p - q) * (p - 1.0)), p / ((p - q) * (q - 1.0)), p * q / ((p - 1.0) * (q - 1.0))];
+        let of_two = [0.0, 1.0 / (q - 1.0), q / (q - 1.0)];
+        let moved_by =
+            |weights: [f64; 3]| [0, 1, 2].map(|i| weights[i] * rounding[i]).into_iter().fold(0.0, f64::hypot);
+        let noise = rounding.into_iter().fold(0.0, f64::max);
         let order = order([half, between, full], points);
         let farthest = [half - between, between - full, half - full].map(f64::abs).into_iter().fold(0.0, f64::max);
         let terms = [(two - full).abs(), (three - two).abs()];
         let falls_by = |orders: std::ops::RangeInclusive<f64>| order.is_some_and(|order| orders.contains(&order));
         let is_resolved = turn <= MAX_TURN;
-        let asymptotic = is_resolved && (falls_by(ORDERS) || farthest < SMALL * full);
-        let (t, error) = if asymptotic {
+        let asymptotic = is_resolved && (falls_by(ORDERS) || farthest < (SMALL * full).max(OF_NOISE * noise));
+        let (t, error, rounding) = if asymptotic {
             let left = OF_SPACE * remainder(terms, turn.powi(2));
-            (three, if falls_by(ORDERS) { left } else { left.max(farthest) })
+            (three, if falls_by(ORDERS) { left } else { left.max(farthest) }, moved_by(of_three))
         } else {
             let bound = OF_OPEN * remainder(terms, turn.min(1.0));
             let few_nodes_explain = !is_resolved && falls_by(LOOSE_ORDERS);
-            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) })
+            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) }, moved_by(of_two))
         };
-        OfSpace { t, error, order, asymptotic }
+        OfSpace { t, error, rounding, order, asymptotic }
     }
 }
 
@@ -222,7 +236,8 @@ mod tests {
         let levels: Vec<f64> = points.iter().map(|n| at(1.0 / *n as f64)).collect();
         let turn = turn * points[2] as f64 / points[points.len() - 1] as f64;
         let (own, points) = (levels[2], points.to_vec());
-        Limit::of(&Times { own, levels, points, own_level: 2, tolerance: 1e-4, is_adaptive: true, turn, excess: 2e-3 })
+        let (rounding, tolerance, excess) = (vec![0.0; levels.len()], 1e-4, 2e-3);
+        Limit::of(&Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive: true, turn, excess })
     }
 
     /// A time whose terms fall by the square of the angle at a node of `n` nodes.
@@ -298,14 +313,15 @@ mod tests {
         // Member 10 of docs/internals/method.md#limit: times that agree by chance are not enough.
         let (own, levels) = (31.82330, vec![31.81772, 31.82203, 31.82330]);
         let (points, tolerance, excess, is_adaptive) = (vec![53, 75, 106], 1e-4, 0.012, true);
-        let times = Times { own, levels, points, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };
+        let rounding = vec![0.0; 3];
+        let times = Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };
         let chance = Limit::of(&times);
         assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.69), "{chance:?}");
         // A time that passes its largest value between levels has no order.
         let levels = vec![1.000672, 1.001219, 1.001099];
         let (points, tolerance, excess) = (vec![40, 57, 80], 1e-4, 0.012);
-        let times =
-            Times { own: levels[2], levels, points, own_level: 2, tolerance, is_adaptive: true, turn: 0.65, excess };
+        let (own, rounding) = (levels[2], vec![0.0; 3]);
+        let times = Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive, turn: 0.65, excess };
         let turned = Limit::of(&times);
         assert!(turned.order.is_none() && turned.needs_more(0.65) && !turned.asymptotic, "{turned:?}");
     }
@@ -319,9 +335,9 @@ mod tests {
     #[test]
     fn the_error_of_steps_goes_with_the_amplitude_at_which_they_are_judged() {
         let at = |excess: f64, tolerance: f64| {
-            let (levels, points) = (vec![2.0; 3], POINTS.to_vec());
+            let (own, levels, points, rounding) = (2.0, vec![2.0; 3], POINTS.to_vec(), vec![0.0; 3]);
             let times =
-                Times { own: 2.0, levels, points, own_level: 2, tolerance, is_adaptive: true, turn: 0.1, excess };
+                Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive: true, turn: 0.1, excess };
             Limit::of(&times).error
         };
         let (one, small, exact) = (at(1e-2, 1e-4), at(1e-4, 1e-4), at(1e-2, 1e-5));
@@ -333,22 +349,36 @@ mod tests {
     fn what_steps_leave_goes_with_their_tolerance_and_is_removed() {
         let levels = POINTS.map(|n| 2.001 + 50.0 / (n as f64).powi(2)).to_vec();
         let at = |is_adaptive: bool| {
-            let (levels, points) = (levels.clone(), POINTS.to_vec());
+            let (own, levels, points, rounding) = (levels[2] + 0.009, levels.clone(), POINTS.to_vec(), vec![0.0; 3]);
             let (own_level, tolerance, turn, excess) = (2, 1e-4, 0.1, 1e-2);
-            Limit::of(&Times {
-                own: levels[2] + 0.009,
-                levels,
-                points,
-                own_level,
-                tolerance,
-                is_adaptive,
-                turn,
-                excess,
-            })
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess })
         };
         let [adaptive, other] = [true, false].map(at);
         assert!((adaptive.t - 2.0).abs() < 1e-12 && (other.t - 2.001).abs() < 1e-12, "{adaptive:?} {other:?}");
         assert!(adaptive.error > OF_STEPS * 0.009 && other.error < 2e-5, "{adaptive:?} {other:?}");
+    }
+
+    #[test]
+    fn rounding_moves_a_limit_by_its_weights_and_no_nodes_lessen_it() {
+        let exact = |n: i32| 2.0 + 40.0 / f64::from(n).powi(2);
+        let at = |by: [f64; 3], rounding: f64| {
+            let levels = [50, 71, 100].iter().zip(by).map(|(n, by)| exact(*n) * (1.0 + by)).collect();
+            let (own, points, rounding) = (exact(100), POINTS.to_vec(), vec![rounding; 3]);
+            let (own_level, tolerance, is_adaptive, turn, excess) = (2, 1e-4, false, 0.2, 2e-3);
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess })
+        };
+        let (moved, blind) = (at([1e-4, -1e-4, 1e-4], 1e-4), at([1e-4, -1e-4, 1e-4], 0.0));
+        assert!(
+            (moved.t - 2.0).abs() < 2.0 * moved.error && (moved.t - 2.0).abs() > 2.0 * blind.error,
+            "{moved:?} {blind:?}"
+        );
+        assert!(moved.asymptotic && !moved.is_open() && moved.fixed > 3e-4 * moved.t, "{moved:?}");
+        // Differences below it have no order.
+        let chance = at([-4e-3, -2e-3, -6e-3], 4e-3);
+        assert!(
+            chance.order.is_none() && chance.asymptotic && !at([-4e-3, -2e-3, -6e-3], 0.0).asymptotic,
+            "{chance:?}"
+        );
     }
 
     #[test]

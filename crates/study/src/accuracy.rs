@@ -143,7 +143,14 @@ impl Search<'_> {
         let mut best: Option<(f64, Spec, Cells)> = None;
         let mut idle = 0;
         loop {
-            let (cells, found) = self.refined(&spec)?;
+            let (cells, found) = match self.refined(&spec) {
+                Ok(round) => round,
+                Err(error) => match (error, best) {
+                    // The device has no room for so many nodes, or too few digits.
+                    (Error::Request(_), Some((_, best, cells))) => return Ok((best, cells)),
+                    (error, _) => return Err(error),
+                },
+            };
             // Without an interval more nodes do not help, either.
             let Some(found) = found else { return Ok(best.map_or((spec, cells), |(_, spec, cells)| (spec, cells))) };
             if found.all() <= self.goal {

@@ -47,7 +47,7 @@ pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
                 (choice.open_for(&cells)?.0, choice.precision())
             }
         };
-        let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink };
+        let mut sink = Judged { level: stage.level, precision, cells: &cells, levels: &mut levels, sink };
         simulate(&cells, precision, backend.as_mut(), study.portraits(stage), &mut sink)?;
     }
     Ok(platform)

@@ -3,7 +3,12 @@
 use super::levels::{LevelRow, RefinementLevel, tolerance};
 use crate::{Outcome, Spec, Variation, request::spec::Pace};
 use curvelax_base::error::Result;
+use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
+
+/// Errors of a time in f32: of its steps, relative, and of the excess, in units of ε.
+const OF_STEPS: f64 = 4e-5;
+const OF_EXCESS: f64 = 0.5;
 
 /// The relaxation times of members at all levels.
 #[derive(Clone, Debug, Default)]
@@ -24,31 +29,36 @@ struct AtLevel {
     turn: f64,
     /// Excess of the initial curve.
     excess: f64,
+    /// The numbers in which it was computed.
+    precision: Precision,
 }
 
 /// A time at consecutive levels, at each of which it is known.
+#[derive(Default)]
 struct Ladder {
     /// The levels, ascending.
     levels: Vec<RefinementLevel>,
     /// The time at each.
     times: Vec<f64>,
+    /// The numbers in which each was computed.
+    precisions: Vec<Precision>,
 }
 
 impl Ladder {
     /// The longest ladder that ends at `top`; empty if the time is not known there.
-    fn up_to(top: RefinementLevel, at: impl Fn(RefinementLevel) -> Option<f64>) -> Ladder {
+    fn up_to(top: RefinementLevel, at: impl Fn(RefinementLevel) -> Option<(f64, Precision)>) -> Ladder {
         let down = std::iter::successors(Some(top), |level| level.coarser());
-        let known = down.map_while(|level| Some((level, at(level)?)));
-        let (mut levels, mut times): (Vec<_>, Vec<_>) = known.unzip();
-        levels.reverse();
-        times.reverse();
-        Ladder { levels, times }
+        let mut known: Vec<_> = down.map_while(|level| Some((level, at(level)?))).collect();
+        known.reverse();
+        let (levels, at): (_, Vec<_>) = known.into_iter().unzip();
+        let (times, precisions) = at.into_iter().unzip();
+        Ladder { levels, times, precisions }
     }
 
     /// What it tells of the time `own` at the nodes of `spec`, with the curve at its finest level; nothing if it is too
     /// short, does not have these nodes, or the time is 0.
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel) -> Option<Limit> {
-        let Ladder { levels, times } = self;
+        let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         // What holds at the start has no time to judge.
         if levels.len() < RefinementLevel::FIRST.len() || !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
@@ -62,7 +72,9 @@ impl Ladder {
             return None;
         }
         let tolerance = tolerance(spec);
-        Some(Limit::of(&Times { own, levels: times, points, own_level, tolerance, is_adaptive, turn, excess }))
+        let rounding = precisions.into_iter().map(|precision| rounding(precision, excess)).collect();
+        let levels = times;
+        Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess }))
     }
 }
 
@@ -81,8 +93,8 @@ impl LevelTimes {
         if let Some(last) = own.last().filter(|last| last.member >= row.member) {
             return Err(format!("a member after {}: members of a level ascend, each once", last.member));
         }
-        let LevelRow { member, turn, excess_start: excess, .. } = *row;
-        own.push(AtLevel { member, t: row.t_relax.unwrap_or(f64::NAN), turn, excess });
+        let LevelRow { member, turn, excess_start: excess, precision, .. } = *row;
+        own.push(AtLevel { member, t: row.t_relax.unwrap_or(f64::NAN), turn, excess, precision });
         self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
@@ -107,7 +119,9 @@ impl LevelTimes {
         }
         let Some(top) = level.coarser() else { return false };
         let ladder = Ladder::up_to(top, |level| self.time(level, member));
-        let Some(own) = self.time(RefinementLevel::FULL, member).filter(|own| *own > 0.0) else { return false };
+        let Some((own, _)) = self.time(RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0) else {
+            return false;
+        };
         let (false, Some(finest)) = (ladder.levels.is_empty(), self.at(top, member)) else { return false };
         // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
         ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more(turn(spec, finest)))
@@ -130,8 +144,9 @@ impl LevelTimes {
         let ladder = self.ladder(|level| self.time(level, member));
         let finest = ladder.levels.last().copied();
         let Some(mut limit) = limit(ladder, own) else { return };
-        limit.fixed = self.moved_by(member, Variation::TwiceTheRadius).unwrap_or_default();
-        limit.error += limit.fixed;
+        let by_radius = self.moved_by(member, Variation::TwiceTheRadius).unwrap_or_default();
+        limit.fixed += by_radius;
+        limit.error += by_radius;
         outcome.judged = Some(limit);
         outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints);
         if let (true, Some(finest)) = (spec.refine, finest) {
@@ -143,21 +158,22 @@ impl LevelTimes {
 
     /// The finest level at which the time of a member is known, if it is at its own nodes.
     fn finest(&self, member: u64) -> Option<RefinementLevel> {
-        let levels = self.ladder(|level| self.time(level, member).filter(|t| *t > 0.0)).levels;
+        let levels = self.ladder(|level| self.time(level, member).filter(|(t, _)| *t > 0.0)).levels;
         levels.last().copied().filter(|_| levels.contains(&RefinementLevel::FULL))
     }
 
     /// By how much a variation of its outline moves the time of a member, at its finest level; unknown if it did not run.
     fn moved_by(&self, member: u64, variation: Variation) -> Option<f64> {
         let finest = self.finest(member)?;
-        Some((self.time(finest.varied(variation), member)? - self.time(finest, member)?).abs())
+        let [varied, own] = [finest.varied(variation), finest].map(|level| self.time(level, member));
+        Some((varied?.0 - own?.0).abs())
     }
 
     /// The ladder that ends at the finest level at which a time is known.
-    fn ladder(&self, at: impl Fn(RefinementLevel) -> Option<f64>) -> Ladder {
+    fn ladder(&self, at: impl Fn(RefinementLevel) -> Option<(f64, Precision)>) -> Ladder {
         let all = (1..=RefinementLevel::MOST).rev().filter_map(RefinementLevel::of_number);
         let top = all.into_iter().find(|level| at(*level).is_some());
-        top.map_or(Ladder { levels: Vec::new(), times: Vec::new() }, |top| Ladder::up_to(top, at))
+        top.map_or_else(Ladder::default, |top| Ladder::up_to(top, at))
     }
 
     fn place(&self, level: RefinementLevel, member: u64) -> Option<usize> {
@@ -168,14 +184,16 @@ impl LevelTimes {
         self.times.get(rank(level))?.get(self.place(level, member)?)
     }
 
-    fn time(&self, level: RefinementLevel, member: u64) -> Option<f64> {
-        self.at(level, member).map(|at| at.t).filter(|t| t.is_finite())
+    /// The time of a member, and the numbers in which it was computed.
+    fn time(&self, level: RefinementLevel, member: u64) -> Option<(f64, Precision)> {
+        self.at(level, member).map(|at| (at.t, at.precision)).filter(|(t, _)| t.is_finite())
     }
 
     /// The time of the event at `place` among `count` of a member.
-    fn event_time(&self, level: RefinementLevel, member: u64, [place, count]: [usize; 2]) -> Option<f64> {
+    fn event_time(&self, level: RefinementLevel, member: u64, [place, count]: [usize; 2]) -> Option<(f64, Precision)> {
         let at = self.place(level, member)? * count + place;
-        self.events.get(rank(level))?.get(at).copied().filter(|t| t.is_finite())
+        let t = self.events.get(rank(level))?.get(at).copied().filter(|t| t.is_finite())?;
+        Some((t, self.at(level, member)?.precision))
     }
 }
 
@@ -183,6 +201,15 @@ impl LevelTimes {
 /// the tangent.
 fn turn(spec: &Spec, at: &AtLevel) -> f64 {
     if spec.refine { spec.turns() * at.turn } else { at.turn }
+}
+
+/// By how much rounding moves a time at this excess, relative to the time. In f32 the excess is off by half a unit in its last
+/// place of 1, and adaptive steps differ by more (docs/internals/precision.md).
+fn rounding(precision: Precision, excess: f64) -> f64 {
+    match precision {
+        Precision::F32 => OF_STEPS.hypot(OF_EXCESS * precision.epsilon() / excess),
+        Precision::F64 => 0.0,
+    }
 }
 
 /// The place of a level among all.

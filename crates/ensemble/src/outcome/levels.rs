@@ -151,7 +151,9 @@ impl RefinementLevel {
 /// Tolerance of the steps at all levels of a cell of `spec`.
 pub(super) fn tolerance(spec: &Spec) -> f64 {
     match spec.pace() {
-        Pace::Adaptive(tolerance) => (tolerance / FINER_STEPS).max(tightest_adaptive(Precision::F64)),
+        Pace::Adaptive(tolerance) => {
+            (tolerance / FINER_STEPS).max(tightest_adaptive(spec.precision.unwrap_or(Precision::F64)))
+        }
         Pace::Fixed(_) => EXACT,
     }
 }
@@ -175,6 +177,8 @@ pub struct LevelRow {
     pub points: u64,
     /// Tolerance of adaptive steps.
     pub adaptive: Option<f64>,
+    /// The numbers in which it was computed.
+    pub precision: Precision,
     /// How it ended.
     pub status: Status,
     /// Its relaxation time.
@@ -190,14 +194,15 @@ pub struct LevelRow {
 }
 
 impl LevelRow {
-    /// The row of a member that ended at `level` in `cell`.
-    pub fn new(level: RefinementLevel, cell: &Spec, ended: &Outcome) -> LevelRow {
+    /// The row of a member that ended at `level` in `cell`, computed in such numbers.
+    pub fn new(level: RefinementLevel, cell: &Spec, precision: Precision, ended: &Outcome) -> LevelRow {
         LevelRow {
             member: ended.member,
             level: level.number(),
             cell: ended.cell,
             points: cell.points as u64,
             adaptive: cell.adaptive,
+            precision,
             status: ended.status,
             t_relax: ended.t_relax,
             solves: ended.solves,

@@ -5,11 +5,14 @@ use crate::{
     outcome::levels::RefinementLevel,
 };
 use curvelax_base::error::{Error, Result};
+use curvelax_flow::number::Precision;
 
 /// Hands the members of a level to a sink as rows, and those of the study with what the levels tell of them.
 pub struct Judged<'a> {
     /// The level that runs, if it is not the study itself.
     pub level: Option<RefinementLevel>,
+    /// The numbers in which it computes.
+    pub precision: Precision,
     /// Its cells.
     pub cells: &'a [Cell],
     /// The times so far.
@@ -30,7 +33,7 @@ impl Sink for Judged<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         match self.level {
             Some(level) => {
-                let row = LevelRow::new(level, self.cell(&ended.outcome)?, &ended.outcome);
+                let row = LevelRow::new(level, self.cell(&ended.outcome)?, self.precision, &ended.outcome);
                 self.levels.add(&row).map_err(|e| Error::Failed(format!("levels: expected {e}")))?;
                 self.sink.level(&row)
             }

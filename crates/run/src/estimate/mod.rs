@@ -146,7 +146,7 @@ impl Estimate {
             held_rows |= in_pilot.rows() > size::MANY_ROWS && !other;
             if let Some(level) = stage.level {
                 levels.add(&work);
-                pilots.first().into_iter().for_each(|seen| finer.add(level, &cells[0].spec, seen));
+                pilots.first().into_iter().for_each(|seen| finer.add(level, &cells[0].spec, precision, seen));
                 continue;
             }
             opened = Some(platform);

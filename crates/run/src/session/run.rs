@@ -156,7 +156,7 @@ fn advance(
         report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());
         let standing = std::mem::take(&mut standing);
         let mut shown = Shown { report, host };
-        let mut sink = Judged { level: stage.level, cells: &cells, levels: &mut levels, sink: &mut shown };
+        let mut sink = Judged { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
         simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), standing, &mut sink)?;
     }
     Ok(())
