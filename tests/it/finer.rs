@@ -50,6 +50,41 @@ fn same(home: &Path, one: &str, other: &str) {
 }
 
 #[test]
+fn limits_in_f32_are_those_in_f64_within_their_errors() {
+    let home = TempDir::new().unwrap();
+    let curves =
+        "run --accurate --shape ellipse:choice(1.05,7),1 --amplitude 0.02 --modes 2..=5 --backend cpu --points 200";
+    let [single, double] = ["f32", "f64"].map(|precision| {
+        done(home.path(), &format!("{curves} --curves 6 --precision {precision} --out {precision}"));
+        rows(&home.path().join(precision).join("summary.csv"))
+    });
+    let mut farthest = 0.0_f64;
+    for (single, double) in single.iter().zip(&double) {
+        let off = number::<f64>(single, "t_limit") - number::<f64>(double, "t_limit");
+        let [error, exact] = [single, double].map(|row| number::<f64>(row, "t_error"));
+        assert!(off.abs() < error && error < 1e-2 * number::<f64>(single, "t_limit"), "{single:?} {double:?}");
+        farthest = farthest.max(off.abs() / exact);
+    }
+    // The control: errors that know nothing of rounding.
+    println!("{farthest} errors of f64");
+    assert!(farthest > 0.1);
+    // Beyond the nodes of f32 members go on in f64.
+    let numbers: BTreeSet<(bool, String)> = rows(&home.path().join("f32/levels.csv"))
+        .iter()
+        .map(|row| (number::<u64>(row, "points") > 320, row["precision"].clone()))
+        .collect();
+    assert_eq!(numbers, BTreeSet::from([(false, "f32".to_owned()), (true, "f64".to_owned())]));
+    for (more, problem) in [
+        ("--solver gauss-seidel", "the rounding of solves by sweeps in f32"),
+        ("--energy cos:4,0.03", "the rounding of solves of crystals in f32"),
+    ] {
+        let output = curvelax(home.path(), &format!("{curves} --precision f32 {more} --out refused"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains(problem), "{more}: {said}");
+    }
+}
+
+#[test]
 fn only_rough_members_get_more_nodes_and_their_limit_rests_on_them() {
     let home = TempDir::new().unwrap();
     let told = done(home.path(), &format!("{MIXTURE} --points 64 --curves 12 --out out"));

@@ -7,8 +7,8 @@ use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the excess, in units of ε.
-const OF_STEPS: f64 = 4e-5;
-const OF_EXCESS: f64 = 0.5;
+const OF_STEPS: f64 = 2.5e-5;
+const OF_EXCESS: f64 = 0.05;
 
 /// The relaxation times of members at all levels.
 #[derive(Clone, Debug, Default)]
@@ -203,8 +203,7 @@ fn turn(spec: &Spec, at: &AtLevel) -> f64 {
     if spec.refine { spec.turns() * at.turn } else { at.turn }
 }
 
-/// By how much rounding moves a time at this excess, relative to the time. In f32 the excess is off by half a unit in its last
-/// place of 1, and adaptive steps differ by more (docs/internals/precision.md).
+/// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit).
 fn rounding(precision: Precision, excess: f64) -> f64 {
     match precision {
         Precision::F32 => OF_STEPS.hypot(OF_EXCESS * precision.epsilon() / excess),

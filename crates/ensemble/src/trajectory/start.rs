@@ -54,7 +54,8 @@ impl<'a> Trajectory<'a> {
         launch.counters.order =
             FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
-        let watches = Watch::of(&spec.event, &launch.report.now, unit, precision);
+        let resolution = resolution(precision, parameters.branches().law.is_crystal());
+        let watches = Watch::of(&spec.event, &launch.report.now, unit, precision, resolution);
         let start = Observables::new(&launch.report.now, turning, unit);
         let vanishing = Vanishing::new(flow.clone(), forcing, (&start, nodes.len()), unit, precision);
         let stops = spec.stops_when_relaxed() && !vanishing.as_ref().is_some_and(Vanishing::is_expected);
@@ -62,9 +63,9 @@ impl<'a> Trajectory<'a> {
         let limit = spec.threshold(member.given_excess.unwrap_or(start.excess));
         let course = match spec.keeps_both() {
             true => Course::Settling,
-            false => Course::of(start.excess, turning, limit, precision),
+            false => Course::of(start.excess, turning, limit, resolution),
         };
-        set_thresholds(&mut launch, course, start.excess, limit, precision);
+        set_thresholds(&mut launch, course, start.excess, limit, resolution);
         let (time, out_of_range) = begin_time(&mut launch, spec, time_unit, precision);
         let clock = time.unit(time_unit);
         launch.parameters.clock_end = spec.final_time() / clock;
@@ -113,20 +114,20 @@ impl<'a> Trajectory<'a> {
 
 impl Course {
     /// The course of a curve with this excess and turning number, which is relaxed at an excess of `limit`.
-    fn of(excess: f64, turning: f64, limit: f64, precision: Precision) -> Course {
+    fn of(excess: f64, turning: f64, limit: f64, resolution: f64) -> Course {
         match limit {
             _ if excess <= ROUND => Course::Round,
             _ if turning.abs() != 1.0 => Course::Immersed,
             limit if excess <= limit => Course::Round,
-            limit if limit < resolution(precision) => Course::Unresolved,
+            limit if limit < resolution => Course::Unresolved,
             _ => Course::Followed,
         }
     }
 }
 
 /// Sets the thresholds of the excess between `excess` and `limit`, and the length at which the curve has vanished.
-fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, precision: Precision) {
-    let (resolution, parameters) = (resolution(precision), &mut launch.parameters);
+fn set_thresholds(launch: &mut Run<f64>, course: Course, excess: f64, limit: f64, resolution: f64) {
+    let parameters = &mut launch.parameters;
     let reachable = course != Course::Immersed && course != Course::Settling && excess > ROUND;
     let threshold = |excess: f64| if reachable && excess >= resolution { excess } else { NO_THRESHOLD };
     parameters.relax_at = if course == Course::Followed { limit } else { NO_THRESHOLD };

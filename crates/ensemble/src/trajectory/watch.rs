@@ -13,10 +13,13 @@ use curvelax_flow::{
 pub(super) const ROUND: f64 = 1e-13;
 /// An excess is a difference of numbers near 1: a threshold below this multiple of ε is within its rounding.
 const RESOLUTION: f64 = 128.0;
+/// The same where it is that of a regular polygon, in f32, which is right to half an ε.
+const RESOLUTION_SHORT: f64 = 8.0;
 
 /// An excess below which a threshold lies in the rounding of the precision.
-pub(super) fn resolution(precision: Precision) -> f64 {
-    RESOLUTION * precision.epsilon()
+pub(super) fn resolution(precision: Precision, is_crystal: bool) -> f64 {
+    let multiple = if precision == Precision::F32 && !is_crystal { RESOLUTION_SHORT } else { RESOLUTION };
+    multiple * precision.epsilon()
 }
 
 /// A condition of one member.
@@ -33,11 +36,17 @@ pub(super) struct Watch {
 
 impl Watch {
     /// The watches of a member that starts with the observables `start`, in lengths of `unit`.
-    pub(super) fn of(events: &[Event], start: &Observed<f64>, unit: f64, precision: Precision) -> Vec<Watch> {
-        events.iter().map(|event| Watch::new(&event.condition, start, unit, precision)).collect()
+    pub(super) fn of(
+        events: &[Event],
+        start: &Observed<f64>,
+        unit: f64,
+        precision: Precision,
+        resolution: f64,
+    ) -> Vec<Watch> {
+        events.iter().map(|event| Watch::new(&event.condition, start, unit, precision, resolution)).collect()
     }
 
-    fn new(condition: &Condition, start: &Observed<f64>, unit: f64, precision: Precision) -> Watch {
+    fn new(condition: &Condition, start: &Observed<f64>, unit: f64, precision: Precision, resolution: f64) -> Watch {
         let Condition { observable, falls, .. } = *condition;
         let level = precision.rounded(condition.level_in(unit, start));
         let is_excess = observable == Observable::Excess;
@@ -47,7 +56,7 @@ impl Watch {
         if is_round || watch.is_reached_by(start) {
             return Watch { t: Some(0.0), ..watch };
         }
-        let is_lost = is_excess && level < resolution(precision);
+        let is_lost = is_excess && level < resolution;
         Watch { level: if is_lost { f64::NAN } else { watch.level }, ..watch }
     }
 
@@ -109,7 +118,7 @@ mod tests {
         .iter()
         .map(|text| text.parse().unwrap())
         .collect();
-        let mut watches = Watch::of(&events, &start, 1.0, Precision::F64);
+        let mut watches = Watch::of(&events, &start, 1.0, Precision::F64, 1e-14);
         // One holds from the start, one is below the rounding.
         assert_eq!(watches.iter().map(|watch| watch.t).collect::<Vec<_>>(), [None, None, None, None, Some(0.0), None]);
         let mut p = Parameters::default();
@@ -128,7 +137,8 @@ mod tests {
     fn levels_are_in_the_units_of_the_member_and_in_numbers_of_the_run() {
         let events = ["a = length <= 6.4".parse().unwrap(), "b = k_max <= 0.1".parse().unwrap()];
         let start = Observed { length: 8.0, k_max: 4.0, ..Observed::default() };
-        let levels = |precision| Watch::of(&events, &start, 4.0, precision).iter().map(|w| w.level).collect::<Vec<_>>();
+        let levels =
+            |precision| Watch::of(&events, &start, 4.0, precision, 1e-14).iter().map(|w| w.level).collect::<Vec<_>>();
         assert_eq!(levels(Precision::F64), [1.6, 0.4]);
         assert_eq!(levels(Precision::F32), [f64::from(1.6_f32), f64::from(0.4_f32)]);
     }
