@@ -261,7 +261,7 @@ fn the_page_tells_what_was_rounded_off() {
     let wedge = [("wedge.csv", "0,0\n3,-1\n3,1\n")];
     let rounded = run_with(&wedge, "--curves 2 --shape file:wedge.csv --tau 1e-7 --t-end 2e-7 --solver direct");
     let page = rounded.text("report.html");
-    assert!(page.contains("Corners were rounded off in 2 members, in at most ") && page.contains(" % and put back."));
+    assert!(page.contains("2 members were smoothed until the nodes resolved") && page.contains(" %, which was then restored."));
     let untouched = run("--curves 2 --tau 1e-7 --t-end 2e-7 --solver direct").text("report.html");
     assert!(!untouched.contains("Corners were"));
 }

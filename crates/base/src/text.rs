@@ -5,6 +5,28 @@ use std::path::Path;
 /// Significant digits that tell any two numbers apart.
 const MOST_DIGITS: usize = 17;
 
+/// Conversions between types that are written as text, for serde: by their `Display` and `FromStr`.
+#[macro_export]
+macro_rules! as_text {
+    ($($name:ident)*) => {
+        $(
+            impl From<$name> for String {
+                fn from(value: $name) -> String {
+                    value.to_string()
+                }
+            }
+
+            impl TryFrom<String> for $name {
+                type Error = String;
+
+                fn try_from(text: String) -> std::result::Result<$name, String> {
+                    text.parse()
+                }
+            }
+        )*
+    };
+}
+
 /// `value` with `digits` significant digits: plain from 10⁻³ to 10⁶, otherwise with a power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {

@@ -95,18 +95,7 @@ impl FromStr for Modes {
     }
 }
 
-impl From<Modes> for String {
-    fn from(modes: Modes) -> String {
-        modes.to_string()
-    }
-}
-
-impl TryFrom<String> for Modes {
-    type Error = String;
-    fn try_from(text: String) -> Result<Modes, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Modes);
 
 /// The validated law of the perturbation: σ, the modes and p.
 #[derive(Clone, Copy, Debug, PartialEq)]

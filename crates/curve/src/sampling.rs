@@ -68,18 +68,7 @@ impl FromStr for Sampling {
     }
 }
 
-impl From<Sampling> for String {
-    fn from(sampling: Sampling) -> String {
-        sampling.to_string()
-    }
-}
-
-impl TryFrom<String> for Sampling {
-    type Error = String;
-    fn try_from(text: String) -> Result<Sampling, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Sampling);
 
 /// A base curve prepared for sampling into n nodes, whatever its perturbation.
 pub struct Sampler {

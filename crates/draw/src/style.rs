@@ -84,9 +84,9 @@ const CHART_DARK: &str = "\
 
 /// Rules of all pictures, followed by those of one kind: always, and in dark mode, which paper has not.
 pub fn sheet(medium: Medium, light: &str, dark: &str) -> String {
-    match medium {
-        Medium::Screen => format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n"),
-        Medium::Paper(_) => format!("{LIGHT}{light}"),
+    match medium.is_screen() {
+        true => format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n"),
+        false => format!("{LIGHT}{light}"),
     }
 }
 

@@ -180,18 +180,7 @@ macro_rules! function {
             }
         }
 
-        impl From<$name> for String {
-            fn from(function: $name) -> String {
-                function.to_string()
-            }
-        }
-
-        impl TryFrom<String> for $name {
-            type Error = String;
-            fn try_from(text: String) -> Result<$name, String> {
-                text.parse()
-            }
-        }
+        curvelax_base::as_text!($name);
 
         impl $name {
             /// Returns its waves.

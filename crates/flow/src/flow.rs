@@ -166,18 +166,7 @@ impl fmt::Display for Flow {
     }
 }
 
-impl From<Flow> for String {
-    fn from(flow: Flow) -> String {
-        flow.to_string()
-    }
-}
-
-impl TryFrom<String> for Flow {
-    type Error = String;
-    fn try_from(text: String) -> Result<Flow, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Flow);
 
 impl FromStr for Flow {
     type Err = String;

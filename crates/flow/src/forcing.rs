@@ -238,26 +238,7 @@ impl FromStr for Conserved {
     }
 }
 
-macro_rules! as_text {
-    ($($name:ident)*) => {
-        $(
-            impl From<$name> for String {
-                fn from(value: $name) -> String {
-                    value.to_string()
-                }
-            }
-
-            impl TryFrom<String> for $name {
-                type Error = String;
-                fn try_from(text: String) -> Result<$name, String> {
-                    text.parse()
-                }
-            }
-        )*
-    };
-}
-
-as_text!(Drive Conserved);
+curvelax_base::as_text!(Drive Conserved);
 
 #[cfg(test)]
 mod tests {

@@ -261,9 +261,14 @@ impl Spec {
         if self.conserve == Some(Conserved::Length) {
             return LENGTH_TURNS;
         }
+        self.highest_wave().unwrap_or(1).max(1).into()
+    }
+
+    /// The highest wave of γ and M.
+    pub(crate) fn highest_wave(&self) -> Option<u32> {
         let energy = self.energy.as_ref().and_then(|of| of.typical().waves().highest_mode());
         let diffusivity = self.diffusivity.as_ref().and_then(|of| of.typical().waves().highest_mode());
-        energy.max(diffusivity).unwrap_or(1).max(1).into()
+        energy.max(diffusivity)
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.

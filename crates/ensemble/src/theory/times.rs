@@ -121,7 +121,7 @@ fn far_omega(spec: &Spec, own: f64) -> Option<String> {
         true => "moves nodes faster than the curve moves",
         false => "is too slow to keep the nodes of the curve evenly spaced",
     };
-    far.then(|| format!("--omega {} {what}: auto is {} here", number(omega), short(own)))
+    far.then(|| format!("--omega {} {what}; use auto, which is {} here", number(omega), short(own)))
 }
 
 fn far_tau(spec: &Spec, own: f64) -> Option<String> {
@@ -131,7 +131,7 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
         ratio if ratio < SHORT_TAU => "needs far more steps than the curve does",
         _ => return None,
     };
-    Some(format!("--tau {} {what}: auto is {} here", number(tau), short(own)))
+    Some(format!("--tau {} {what}; use auto, which is {} here", number(tau), short(own)))
 }
 
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
@@ -331,10 +331,10 @@ mod tests {
             ("omega = 1\nadaptive = 0.001\nshape = 'ellipse:200,100'\nt-end = 2e8", "--omega 1 needs more steps than"),
             (
                 "omega = 1e-4\nadaptive = 0.001",
-                "--omega 0.0001 is too slow to keep the nodes of the curve evenly spaced: auto is 1 here",
+                "--omega 0.0001 is too slow to keep the nodes of the curve evenly spaced; use auto, which is 1 here",
             ),
-            ("omega = 500", "--omega 500 moves nodes faster than the curve moves: auto is 1 here"),
-            ("tau = 0.11", "--tau 0.11 is too long for the curve to be followed: auto is 0.000998 here"),
+            ("omega = 500", "--omega 500 moves nodes faster than the curve moves; use auto, which is 1 here"),
+            ("tau = 0.11", "--tau 0.11 is too long for the curve to be followed; use auto, which is 0.000998 here"),
             ("tau = 9e-9\nt-end = 0.01", "--tau 9e-9 needs far more steps than the curve does"),
             (
                 "t-end = 1e-4\ntau = 1e-6",

@@ -21,6 +21,8 @@ const COLUMNS: usize = 4;
 /// Width and maximum height of a panel on a screen in pixels, and the least on paper.
 const SIDE: f64 = 200.0;
 const LEAST_SIDE: f64 = 170.0;
+/// The least on a page, where the picture is as wide as a chart.
+const LEAST_SIDE_ON_PAGE: f64 = 150.0;
 /// Size of text.
 pub(super) const SIZE: f64 = 12.0;
 const MIN_HEIGHT: f64 = 100.0;
@@ -98,10 +100,12 @@ pub(super) fn style(medium: Medium) -> String {
 pub(super) fn columns(medium: Medium, count: usize) -> (usize, f64) {
     match medium {
         Medium::Screen => (count.clamp(MIN_COLUMNS, COLUMNS), SIDE),
-        Medium::Paper(width) => {
-            let room = width - 2.0 * MARGIN + GAP;
-            let most = ((room / (LEAST_SIDE + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
-            let columns = count.clamp(MIN_COLUMNS, most);
+        Medium::Page | Medium::Paper(_) => {
+            let room = medium.width() - 2.0 * MARGIN + GAP;
+            let least = if medium.is_screen() { LEAST_SIDE_ON_PAGE } else { LEAST_SIDE };
+            let most = ((room / (least + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
+            // Full rows, if that is possible: four are two by two.
+            let columns = count.div_ceil(count.div_ceil(most).max(1)).clamp(MIN_COLUMNS, most);
             (columns, room / columns as f64 - GAP)
         }
     }
@@ -153,10 +157,10 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
     let legend = match rests {
         true => "dashed: Wulff shape, grey: start, colour: end",
-        false => "grey: start, light: on the way, colour: end",
+        false => "grey: start, light: in between, colour: end",
     };
     match medium {
-        Medium::Screen => {
+        Medium::Screen | Medium::Page => {
             svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
             svg.text("note end", DVec2::new(width - MARGIN, 30.0), legend);
         }

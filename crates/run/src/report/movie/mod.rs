@@ -23,7 +23,7 @@ use super::{
 use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
 use curvelax_draw::axis::tick_step;
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, Status};
 use curvelax_files::portraits::Film;
 use moved::MovedMember;
 use pace::MoviePace;
@@ -155,7 +155,7 @@ impl Movie {
             let moved = states.into_iter().map(|nodes| nodes.into_iter().map(pixel).collect());
             let frames = film.times.iter().copied().zip(moved).collect();
             let unit = time_unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-            let end = match (film.t_relax, t_limit(film.member)) {
+            let end = match (film.t_relax.filter(|_| film.status != Status::Vanished), t_limit(film.member)) {
                 (Some(t), Some(limit)) => (t, film.status.name().to_string() + &in_the_limit(limit, &unit)),
                 (Some(t), None) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
                 (None, _) => (film.times.last().copied().unwrap_or_default(), film.status.name().into()),

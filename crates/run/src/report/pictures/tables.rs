@@ -47,9 +47,10 @@ impl FinishedRun<'_> {
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
         };
-        let raw = if self.statistics.of_limits { "; t_relax is raw, at the nodes of the run" } else { "" };
+        let raw = if self.statistics.of_limits { "; t_relax is that of the run, at its n" } else { "" };
         PageTable {
             caption: format!("Each member{raw}"),
+            note: String::new(),
             header: header.collect(),
             rows: self.tally.named.iter().map(row).collect(),
             source: names::SUMMARY.into(),
@@ -126,6 +127,7 @@ impl FinishedRun<'_> {
             header: header.map(String::from).collect(),
             rows: rows.collect(),
             source: names::EVENT_STATISTICS.into(),
+            note: String::new(),
         })
     }
 
@@ -153,6 +155,7 @@ impl FinishedRun<'_> {
             header: header.into_iter().chain(left_out).map(String::from).collect(),
             rows: cells.iter().map(row).collect(),
             source: String::new(),
+            note: String::new(),
         })
     }
 
@@ -187,11 +190,11 @@ impl FinishedRun<'_> {
         let keys = self.keys();
         let first = if keys.is_empty() { "cell" } else { &keys };
         let header = [first, "time", "feature", "members", "censored", "Spearman", "R²", "chosen"];
-        (!rows.is_empty()).then(|| PageTable {
-            caption: format!(
-                "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a \
-                 linear regression on the chosen ones (R² cross-validated), over the members that reached the time; nothing \
-                 {}{}",
+        rows.iter().any(|row| row.r2.is_some()).then(|| PageTable {
+            caption: "What explains the times".into(),
+            note: format!(
+                "The {LISTED} best features of each time, alone (R² of a straight line), and a linear regression on the \
+                 chosen ones (R² cross-validated), over the members that reached the time. Nothing is said {}{}.",
                 claims(),
                 self.left_out()
             ),
@@ -241,6 +244,7 @@ impl FinishedRun<'_> {
             header: header.collect(),
             rows: rows.map(row).collect(),
             source: source.into(),
+            note: String::new(),
         }
     }
 }
