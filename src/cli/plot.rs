@@ -17,7 +17,7 @@ use crate::{
         part_file::PartFile,
         reader::{self, Finished},
     },
-    paper::{Printer, told},
+    paper::{Printer, missing_letters},
     report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
@@ -115,7 +115,7 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     if args.quiet {
         return Ok(());
     }
-    told(&missing).iter().for_each(|told| note(&format!("note: {told}")));
+    missing_letters(&missing).iter().for_each(|missing_letters| note(&format!("note: {missing_letters}")));
     print(&format!("results    {}: {names}\n", out.display()))
 }
 

@@ -10,7 +10,7 @@ use std::{
 use curvelax::{
     ensemble::Spec,
     files::{Existing, state::checkpoint},
-    report::{Cause, Form, Manner, Progress, Stop},
+    report::{Cause, Progress, ReportOptions, ResultFormat, Stop},
     session::{Host, PlacedStudy, ResumePlace, RunPlan, begin, resume},
 };
 use tempfile::TempDir;
@@ -127,15 +127,15 @@ struct Patient(Option<u64>);
 impl Host for Patient {
     fn say(&self, _: &str) {}
 
-    fn form(&self) -> Form {
-        Form::Json
+    fn form(&self) -> ResultFormat {
+        ResultFormat::Json
     }
 
-    fn manner(&self) -> curvelax::Result<Manner> {
+    fn options(&self) -> curvelax::Result<ReportOptions> {
         Ok(self.manner_with(Stop::default()))
     }
 
-    fn manner_with(&self, stop: Stop) -> Manner {
+    fn manner_with(&self, stop: Stop) -> ReportOptions {
         let (enough, asked) = (self.0, stop.clone());
         let tell = move |done: u64, total: u64, share: f64| {
             assert!(done <= total && share <= 1.0, "{done} of {total}, {share}");
@@ -143,8 +143,8 @@ impl Host for Patient {
                 asked.ask(Cause::Terminate);
             }
         };
-        let progress = Progress::Told(Box::new(tell));
-        Manner { since: Instant::now(), progress, every: Duration::ZERO, stop, patience: Duration::MAX }
+        let progress = Progress::Callback(Box::new(tell));
+        ReportOptions { since: Instant::now(), progress, every: Duration::ZERO, stop, patience: Duration::MAX }
     }
 }
 
@@ -154,10 +154,10 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
     let text = "shape = 'ellipse:choice(1.3,4),1'\namplitude = 0.02\nmodes = '2..=5'\npoints = 64\nadaptive = 1e-3\n\
                 pull = 'auto'\nt-end = 'auto'\nrefine = true\nbackend = 'cpu'\nthreads = 1\nevent = ['half = excess <= 0.5 * start']";
     let spec = Spec { curves: 60, ..Spec::from_toml(text).unwrap() };
-    let manner = |host: &Patient| host.manner().unwrap();
+    let options = |host: &Patient| host.options().unwrap();
     let run = |out: &str, host: Patient| {
         let placed = RunPlan::new(spec.clone(), None, &host).and_then(PlacedStudy::of).unwrap();
-        begin(placed, &home.path().join(out), Existing::Refused, manner(&host), &host)
+        begin(placed, &home.path().join(out), Existing::Refused, options(&host), &host)
     };
     run("whole", Patient(None)).unwrap();
     let whole = levels(&home.path().join("whole/levels.csv"));

@@ -168,7 +168,7 @@ fn groups_are_the_ensembles_of_their_members() {
 }
 
 #[test]
-fn copies_of_an_outline_are_no_independent_draws_and_cells_with_the_same_outlines_are_pairs() {
+fn copies_of_an_outline_are_paired_between_cells_not_compared_as_independent_draws() {
     let home = home();
     let home = home.path();
     let grouped = format!("run --shape file:grains.geojson --group-by phase {RUN} --out");

@@ -169,8 +169,8 @@ impl Sampler {
         }
     }
 
-    /// Returns the signed area of the curve stretched by `factor`, from the samples by which its length is measured: that
-    /// of an outline does not depend on the number of nodes.
+    /// Returns the signed area of the curve stretched by `factor`, from the samples by which its length is measured:
+    /// that of an outline does not depend on the number of nodes.
     pub fn area(&self, factor: &RadialFactor) -> f64 {
         let centre = self.curve.centroid();
         match &self.plan {

@@ -10,7 +10,7 @@ use super::{
     medium::Medium,
     style,
     svg::{Svg, coordinate, dots},
-    width::{SIZE, TITLE, shortened, told_apart, width, wrapped},
+    width::{SIZE, TITLE, distinct, shortened, width, wrapped},
 };
 use curvelax_base::{interval::Interval, text::significant};
 
@@ -49,7 +49,7 @@ impl EstimatedNumber {
     pub fn shown(&self) -> String {
         let value = significant(self.value, 3);
         match self.interval {
-            Some(interval) => format!("{value} ({})", interval.told_shortly(|end| significant(end, 3))),
+            Some(interval) => format!("{value} ({})", interval.in_short(|end| significant(end, 3))),
             None => value,
         }
     }
@@ -80,7 +80,7 @@ pub enum LegendMark {
     Right,
     /// The short stroke of a censored member.
     Stroke,
-    /// Nothing: its label goes on from the line above.
+    /// Nothing: its label continues the line above.
     More,
 }
 
@@ -215,8 +215,8 @@ impl Heading<'_> {
         (svg, top)
     }
 
-    /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the text
-    /// of the page has the rest, and broken into lines on paper.
+    /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the
+    /// text of the page has the rest, and broken into lines on paper.
     fn rows(&self, room: f64, medium: Medium) -> Vec<Vec<(f64, Entry)>> {
         let most = room - SAMPLE - 6.0;
         let fitted = |entry: &Entry| -> Vec<Entry> {
@@ -546,7 +546,7 @@ impl Colours {
         let step = names.len().div_ceil((height / LINE) as usize).max(1);
         let shown: Vec<(usize, &String)> = names.iter().enumerate().step_by(step).collect();
         let texts: Vec<String> = shown.iter().map(|(_, name)| name.to_string()).collect();
-        let texts = told_apart(&texts, SIZE, MAX_NAME);
+        let texts = distinct(&texts, SIZE, MAX_NAME);
         shown.iter().map(|(i, _)| *i as f64).zip(texts).collect()
     }
 

@@ -6,8 +6,8 @@
 
 use super::medium::Medium;
 
-/// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …; the patterns alone are
-/// `d0`, `d1`, …
+/// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …; the patterns alone
+/// are `d0`, `d1`, …
 pub const SERIES: usize = 8;
 /// Number of colours in [`chart`] that order curves, from low to high: classes `r0`, `r1`, …
 pub const RAMP: usize = 12;

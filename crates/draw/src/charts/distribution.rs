@@ -11,7 +11,7 @@ use crate::{
     chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, nothing},
     medium::Medium,
     svg::{Svg, coordinate, dots},
-    width::{SIZE, shortened, told_apart, width},
+    width::{SIZE, distinct, shortened, width},
 };
 use curvelax_base::text::significant;
 
@@ -118,7 +118,7 @@ impl TimeDistribution<'_> {
         let (mut svg, top) = heading.begin(medium, above + boxes + FOOT + laws);
 
         let names: Vec<String> = colours.shown.iter().map(|(i, _)| cells[*i].label.clone()).collect();
-        let names = if rows > 1 { told_apart(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
+        let names = if rows > 1 { distinct(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
         let keys = if rows > 1 { *keys } else { "" };
         let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
@@ -147,8 +147,8 @@ impl TimeDistribution<'_> {
         svg.finish()
     }
 
-    /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do not
-    /// show.
+    /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do
+    /// not show.
     fn groups<'a>(&'a self, colours: &'a Colours) -> Vec<(&'a str, Vec<&'a (usize, String)>)> {
         let Some(crossed) = &self.key.crossed else { return vec![("", colours.shown.iter().collect())] };
         let of = |pattern: usize| {

@@ -45,7 +45,8 @@ impl Trajectory<'_> {
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
-    /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is [needed](Trajectory::needs_last_state).
+    /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is
+    /// [needed](Trajectory::needs_last_state).
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;

@@ -20,9 +20,9 @@ const MAX_NAME: usize = 24;
 const COLUMNS: usize = 4;
 /// Width and maximum height of a panel on a screen in pixels, and the least on paper.
 const SIDE: f64 = 200.0;
-const LEAST_SIDE: f64 = 170.0;
+const MIN_SIDE: f64 = 170.0;
 /// The least on a page, where the picture is as wide as a chart.
-const LEAST_SIDE_ON_PAGE: f64 = 150.0;
+const MIN_SIDE_ON_PAGE: f64 = 150.0;
 /// Size of text.
 pub(super) const SIZE: f64 = 12.0;
 const MIN_HEIGHT: f64 = 100.0;
@@ -102,7 +102,7 @@ pub(super) fn columns(medium: Medium, count: usize) -> (usize, f64) {
         Medium::Screen => (count.clamp(MIN_COLUMNS, COLUMNS), SIDE),
         Medium::Page | Medium::Paper(_) => {
             let room = medium.width() - 2.0 * MARGIN + GAP;
-            let least = if medium.is_screen() { LEAST_SIDE_ON_PAGE } else { LEAST_SIDE };
+            let least = if medium.is_screen() { MIN_SIDE_ON_PAGE } else { MIN_SIDE };
             let most = ((room / (least + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
             // Full rows, if that is possible: four are two by two.
             let columns = count.div_ceil(count.div_ceil(most).max(1)).clamp(MIN_COLUMNS, most);

@@ -103,8 +103,9 @@ impl Overview<'_> {
 
     fn relaxation(&self) -> String {
         let unit = unit(self.spec);
-        self.only_cell()
-            .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.statistics.of_limits, "relaxed"))
+        self.only_cell().map_or(String::new(), |cell| {
+            unit + &times(self.statistics.times(cell), self.statistics.of_limits, "relaxed")
+        })
     }
 
     /// When the members of a single ensemble vanished, if any did.
@@ -159,7 +160,7 @@ impl Overview<'_> {
         // A shard has some of the members that it takes.
         let Some(goal) = self.spec.accuracy.filter(|_| self.spec.shard.is_none()) else { return String::new() };
         if let Some(lack) = Shortfall::of(self.spec, self.statistics) {
-            return lack.told();
+            return lack.in_words();
         }
         let of_each = if self.statistics.of_each { " for each member" } else { "" };
         let reached = rounded_beside(self.statistics.uncertainty(), goal);
@@ -399,14 +400,20 @@ results    out: summary.csv, run.json
         };
         assert_eq!(add(0, 100, true), None);
         assert_eq!(add(1, 100, false).as_deref(), Some("the errors of 1 of 2 members are bounds"));
-        assert_eq!(add(2, 283, true).as_deref(), Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a wide bound"));
-        assert_eq!(add(3, 141, true).as_deref(), Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a wide bound"));
+        assert_eq!(
+            add(2, 283, true).as_deref(),
+            Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+        );
+        assert_eq!(
+            add(3, 141, true).as_deref(),
+            Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+        );
     }
 
     #[test]
-    fn nobody_relaxed_is_said_so() {
+    fn an_overview_says_that_no_member_relaxed() {
         let text = overview(&Tally::default());
-        assert!(text.contains("t_relax    none of 0 members reached it\n"), "{text}");
+        assert!(text.contains("t_relax    none of 0 members relaxed\n"), "{text}");
     }
 
     #[test]
@@ -416,7 +423,7 @@ results    out: summary.csv, run.json
         assert!(overview(&tally).contains("over 1 member that relaxed\n"), "{}", overview(&tally));
         tally.cells[0] = Default::default();
         tally.add(&outcome(0, Status::Unfinished, None)).unwrap();
-        assert!(overview(&tally).contains("none of 1 member reached it\n"), "{}", overview(&tally));
+        assert!(overview(&tally).contains("none of 1 member relaxed\n"), "{}", overview(&tally));
         let one_thread = Platform { threads: Some(1), ..platform() };
         assert!(machine(&one_thread).contains(", 1 thread ("), "{}", machine(&one_thread));
         assert!(machine(&platform()).contains(", 2 threads ("), "{}", machine(&platform()));

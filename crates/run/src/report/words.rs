@@ -185,7 +185,8 @@ pub fn member_time(member: &MemberTime) -> String {
     }
 }
 
-/// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of ten.
+/// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of
+/// ten.
 fn beside(t: f64, error: f64) -> (String, String) {
     let digits = 1 - error.log10().floor() as i32;
     match error > 0.0 && (1e-4..1e6).contains(&t.abs()) && (0..=12).contains(&digits) {
@@ -197,14 +198,16 @@ fn beside(t: f64, error: f64) -> (String, String) {
     }
 }
 
-/// Median and mean of the times at which members `did` something, and how reliable they are; limits have intervals for more than sampling.
+/// Median and mean of the times at which members `did` something, and how reliable they are; limits have intervals for
+/// more than sampling.
 pub(super) fn times(of: &TimeStatistics, of_limits: bool, did: &str) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
     let Some(mean) = of.mean else { return format!("none of {members} {} {did}", plural(members, "member")) };
     let half = || format!("no median, as fewer than half of the members {did}");
     let median = of.median().map_or_else(half, |median| format!("median {}", significant(median)));
     let both = if of_limits { ", for sampling and discretisation" } else { "" };
-    let interval = of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.told(significant)));
+    let interval =
+        of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let censored = match members - known {
@@ -296,7 +299,7 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
         }
     });
     let fitted = fitted.unwrap_or_else(|| format!("no power of {scale} is fitted: too few cells have a median"));
-    let left_out = (!of.left_out.is_empty()).then(|| format!("not in the fit: {}", of.told()));
+    let left_out = (!of.left_out.is_empty()).then(|| format!("not in the fit: {}", of.in_words()));
     [fitted].into_iter().chain(left_out).collect()
 }
 
@@ -385,7 +388,10 @@ mod tests {
             left_out: Vec::new(),
         };
         let holds = "median t_relax scales as amplitude to the power -0.2500, standard error 0.01000";
-        assert_eq!(law(&of(Some(0.25), 5), "t_relax"), [format!("{holds}; chi2 = 12.50 with 3 degrees of freedom, p = 0.25")]);
+        assert_eq!(
+            law(&of(Some(0.25), 5), "t_relax"),
+            [format!("{holds}; chi2 = 12.50 with 3 degrees of freedom, p = 0.25")]
+        );
         let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 with 3 degrees of freedom, p = 1.0e-7; the nearest power is -0.2500, \
                         standard error 0.01000";
         assert_eq!(law(&of(Some(1e-7), 5), "t_relax"), [rejected]);

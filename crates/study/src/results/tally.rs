@@ -227,7 +227,7 @@ const RELAXED: usize = 0;
 
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Aside {
+pub struct TallySupplement {
     mollified: MollifiedMembers,
     drifted: (u64, f64),
     below_rounding: u64,
@@ -235,10 +235,10 @@ pub struct Aside {
     excess: Vec<Vec<Spread>>,
 }
 
-impl Aside {
+impl TallySupplement {
     /// Adds the data of other members.
-    pub fn merge(&mut self, other: &Aside) {
-        let Aside { mollified, drifted, below_rounding, excess } = other;
+    pub fn merge(&mut self, other: &TallySupplement) {
+        let TallySupplement { mollified, drifted, below_rounding, excess } = other;
         self.mollified.merge(mollified);
         self.drifted = (self.drifted.0.saturating_add(drifted.0), self.drifted.1.max(drifted.1));
         self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
@@ -369,15 +369,15 @@ impl Tally {
     }
 
     /// Adds data that are not in a row of the summary.
-    pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
+    pub fn add_supplement(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
         self.below_rounding += u64::from(unresolved);
     }
 
     /// Returns the data that are not in rows.
-    pub fn aside(&self) -> Aside {
+    pub fn supplement(&self) -> TallySupplement {
         let Tally { mollified, drifted, below_rounding, .. } = *self;
-        Aside {
+        TallySupplement {
             mollified,
             drifted,
             below_rounding,
@@ -386,8 +386,8 @@ impl Tally {
     }
 
     /// Sets the data that are not in rows, after all rows were added.
-    pub fn set_aside(&mut self, aside: Aside) {
-        let Aside { mollified, drifted, below_rounding, excess } = aside;
+    pub fn set_supplement(&mut self, supplement: TallySupplement) {
+        let TallySupplement { mollified, drifted, below_rounding, excess } = supplement;
         (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
         self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
     }
@@ -466,13 +466,13 @@ mod tests {
         let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
         let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
         assert_eq!(tally.mollified.smoothing(), None);
-        tally.add_aside(&well, false);
+        tally.add_supplement(&well, false);
         assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
         let words = "1 member was smoothed until the nodes resolved its outline, in at most 7 rounds: the area changed \
                      by at most 5.0 %";
         assert_eq!(tally.mollified.smoothing(), Some(format!("{words}, which was then restored")));
-        tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
-        tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
+        tally.add_supplement(&Mollified { crossed: true, sharp: true, ..well }, false);
+        tally.add_supplement(&Mollified { area_change: -0.2, ..well }, false);
         assert!(tally.mollified.smoothing().is_some_and(|told| told.ends_with("by at most 20 %")));
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
         assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));

@@ -31,8 +31,8 @@ pub struct MollifiedMembers {
     /// Members of outlines all of whose points are corners.
     #[serde(default)]
     pub polygons: u64,
-    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area by
-    /// that, before it was put back.
+    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area
+    /// by that, before it was put back.
     #[serde(default)]
     pub rounded: u64,
     /// See there.
@@ -88,7 +88,9 @@ impl MollifiedMembers {
         let change = significant(100.0 * outline_area_change, 2);
         let round = match rounded {
             0 => String::new(),
-            _ => format!("; corners of {rounded} were rounded, which changed the area by at most {change} % until it was restored"),
+            _ => format!(
+                "; corners of {rounded} were rounded, which changed the area by at most {change} % until it was restored"
+            ),
         };
         (!parts.is_empty()).then(|| format!("{}{round}", parts.join(", ")))
     }
@@ -160,7 +162,8 @@ impl FinerMembers {
         (finer > 0).then(|| (format!("{finer} of {judged}"), format!("up to n = {most}")))
     }
 
-    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for all.
+    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for
+    /// all.
     pub fn in_words(&self) -> Option<String> {
         let FinerMembers { judged, finer, most, bounds } = *self;
         let all = format!("{judged} {}", plural(judged, "member"));

@@ -38,7 +38,8 @@ impl Spec {
         }
     }
 
-    /// Refuses the paper's form, for the reason `in_paper`, where something is `given` for which nodes move in the geometric form.
+    /// Refuses the paper's form, for the reason `in_paper`, where something is `given` for which nodes move in the
+    /// geometric form.
     fn check_geometric(&self, in_paper: &str, given: &str) -> Result<()> {
         match self.form {
             Some(PositionForm::Paper) => {

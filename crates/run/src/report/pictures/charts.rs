@@ -29,14 +29,15 @@ const DISTINCT: usize = SERIES;
 /// Conditions of events in a note.
 const MAX_CONDITIONS: usize = 8;
 /// Maximum quantiles of a cell that are drawn against those of a distribution.
-const MOST_QUANTILES: usize = 99;
+const MAX_QUANTILES: usize = 99;
 /// Maximum panels of a time against features.
 const MAX_PANELS: usize = 8;
 /// Rank of the colour of text among those of series.
 const INK: usize = 4;
 
 impl FinishedRun<'_> {
-    /// The charts of this run, in reading order. Few members that are known by name have their times, and no statistics.
+    /// The charts of this run, in reading order. Few members that are known by name have their times, and no
+    /// statistics.
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
@@ -89,7 +90,7 @@ impl FinishedRun<'_> {
         let numbers = self.numbers();
         let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
             let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
-            let known = self.statistics.times(cell).sample.len().min(MOST_QUANTILES);
+            let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
             let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
             let quantiles = survival.quantiles(shares());
             CellQuantiles {
@@ -294,8 +295,8 @@ impl FinishedRun<'_> {
                 let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
-            let told_apart = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
-            let named = told_apart.map(|(key, value)| format!("{} = {value}", key.key));
+            let distinct = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
+            let named = distinct.map(|(key, value)| format!("{} = {value}", key.key));
             let label = named.collect::<Vec<_>>().join(", ");
             let value = if let [key] = keys[..] { value_of(key, values) } else { None };
             Series { label, value, levels, fit: self.power_law() }
@@ -310,7 +311,7 @@ impl FinishedRun<'_> {
             places: (0..series.len()).map(|i| (INK, i)).collect(),
         });
         let other_key = CellKey { name, crossed, ..CellKey::default() };
-        let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
+        let left_out = self.statistics.scaling.as_ref().map(Scaling::in_words).filter(|told| !told.is_empty());
         let left_out = left_out.map_or(String::new(), |told| format!("not in the fit: {told}"));
         let note = self.note(medium, &joined([self.error(), left_out]));
         let (key, across, time) = (&axis.key[..], None, None);

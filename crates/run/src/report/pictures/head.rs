@@ -182,7 +182,7 @@ impl FinishedRun<'_> {
         }
         let tile =
             |label: &str, value: Option<f64>, note: String| Headline { label: label.into(), value: shown(value), note };
-        let told = |interval: Interval| interval.told_shortly(|end| significant(end, DIGITS)) + &unit;
+        let told = |interval: Interval| interval.in_short(|end| significant(end, DIGITS)) + &unit;
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
             Some(_) => "a lower bound: some members had not relaxed at the end".into(),

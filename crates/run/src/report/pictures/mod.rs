@@ -13,7 +13,7 @@ use super::{
 use glam::DVec2;
 
 use curvelax_base::{error::Result, text::significant};
-use curvelax_draw::{medium::Medium, width::told_apart};
+use curvelax_draw::{medium::Medium, width::distinct};
 use curvelax_ensemble::{Spec, Status, outcome::wulff_outline};
 use curvelax_files::{names, portraits::Film};
 use curvelax_flow::equilibrium::Equilibrium;
@@ -150,7 +150,7 @@ impl FinishedRun<'_> {
         let cell = |film: &Film| self.short_label(film.member / self.spec().members_per_cell());
         let cells: Vec<String> = self.films.iter().map(cell).collect();
         let (_, side) = gallery::columns(medium, self.films.len().min(gallery::MAX_PANELS));
-        let cells = told_apart(&cells, gallery::SIZE, side);
+        let cells = distinct(&cells, gallery::SIZE, side);
         let ends = self.films.iter().map(|film| self.end_of(film));
         let rests = self.films.iter().map(|film| self.at_rest(film).unwrap_or_default());
         Wording { unit: self.length_unit(), cells, ends: ends.collect(), rests: rests.collect() }

@@ -8,7 +8,7 @@ use curvelax_files::names;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
     comparison::CellDifference,
-    explained::{ExplainedRow, LEAST_MEMBERS, MOST_CENSORED, TOGETHER},
+    explained::{ExplainedRow, MAX_CENSORED, MIN_MEMBERS, TOGETHER},
     tally::MemberTime,
     times::{QUANTILES, TimeStatistics},
 };
@@ -251,6 +251,6 @@ impl FinishedRun<'_> {
 
 /// When nothing is said about a time.
 pub(super) fn claims() -> String {
-    let percent = 100.0 * MOST_CENSORED;
-    format!("if fewer than {LEAST_MEMBERS} members reached it, or more than {percent} % did not")
+    let percent = 100.0 * MAX_CENSORED;
+    format!("if fewer than {MIN_MEMBERS} members reached it, or more than {percent} % did not")
 }
