@@ -90,10 +90,10 @@ impl Host for Notebook {
     }
 
     fn options(&self) -> curvelax::Result<ReportOptions> {
-        Ok(self.manner_with(self.shared.stop.clone()))
+        Ok(self.options_with(self.shared.stop.clone()))
     }
 
-    fn manner_with(&self, stop: Stop) -> ReportOptions {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (shared, mut last) = (self.shared.clone(), None::<Instant>);
         let told = move |done: u64, total: u64, share: f64| {
             if last.is_none_or(|last| last.elapsed() >= PERIOD) {

@@ -111,10 +111,10 @@ impl Host for ReportFlags {
     fn options(&self) -> Result<ReportOptions> {
         let stop = Stop::default();
         signals::watch(&stop, self.max_time)?;
-        Ok(self.manner_with(stop))
+        Ok(self.options_with(stop))
     }
 
-    fn manner_with(&self, stop: Stop) -> ReportOptions {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (since, progress, every) = (Instant::now(), Progress::new(self.quiet), self.checkpoint_every);
         ReportOptions { since, progress, every, stop, patience: PATIENCE }
     }

@@ -132,10 +132,10 @@ impl Host for Patient {
     }
 
     fn options(&self) -> curvelax::Result<ReportOptions> {
-        Ok(self.manner_with(Stop::default()))
+        Ok(self.options_with(Stop::default()))
     }
 
-    fn manner_with(&self, stop: Stop) -> ReportOptions {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (enough, asked) = (self.0, stop.clone());
         let tell = move |done: u64, total: u64, share: f64| {
             assert!(done <= total && share <= 1.0, "{done} of {total}, {share}");

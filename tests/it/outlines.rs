@@ -383,7 +383,7 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
     };
     let told = line("");
     assert!(
-        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 rounded, which changed the area by"),
+        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 were rounded, which changed the area by"),
         "{told}"
     );
     assert_eq!(line("--interpolate polygon --rounding 0"), "2 as a polygon");

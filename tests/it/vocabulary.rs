@@ -113,8 +113,8 @@ fn texts() -> Vec<(String, String)> {
     found.iter().map(|path| (name(path), fs::read_to_string(path).unwrap())).collect()
 }
 
-/// The numbers of the lines of prose that are too wide: comments of code, and text of documents that is no table, code or
-/// heading.
+/// The numbers of the lines of prose that are too wide: comments of code, and text of documents that is no table, code
+/// or heading.
 fn wide(name: &str, text: &str) -> Vec<usize> {
     let mut is_code = false;
     let mut is_wide = |line: &str| {

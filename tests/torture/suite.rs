@@ -228,7 +228,7 @@ fn calls_of_the_system(suite: &mut Suite, seed: u64) {
     }
     let (all, strides) = (suite.full, [suite.of(7, 1), suite.of(13, 1)]);
     for (name, study, from, stride) in [
-        ("every_call_fails_once_or_for_ever", &SHORT, From::Start, strides[0]),
+        ("every_call_fails_once_or_always", &SHORT, From::Start, strides[0]),
         ("every_call_fails_with_arrays", &SHORT_ZARR, From::Start, strides[1]),
         ("every_call_of_a_resumed_run_fails", &SHORT, From::Middle, strides[1]),
     ] {
@@ -307,7 +307,7 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     suite.test("a_folder_that_vanishes", "a named error, no panic", move || {
         surroundings::vanished_folder(&SECOND, cases, seed)
     });
-    suite.test("nobody_listens", SAME, || surroundings::nobody_listens(&SHORT));
+    suite.test("no_reader_of_the_output", SAME, || surroundings::no_reader_of_the_output(&SHORT));
     suite.test("locales", SAME, || surroundings::locales(&SHORT));
     let faketime = (!surroundings::has_faketime()).then_some("faketime that works");
     suite.test_if(faketime, "wrong_clocks", SAME, || surroundings::wrong_clocks(&SHORT));

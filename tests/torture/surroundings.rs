@@ -202,7 +202,7 @@ pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
 }
 
 /// Output without a reader: pipes without a reader, closed streams, a full device.
-pub fn nobody_listens(study: &Study) -> Outcome {
+pub fn no_reader_of_the_output(study: &Study) -> Outcome {
     let talkative = |attempt: &Attempt| attempt.run().replace("--quiet ", "");
     let shells = ["exec \"$0\" ARGUMENTS >&-", "exec \"$0\" ARGUMENTS 2>&-", "exec \"$0\" ARGUMENTS >&- 2>&- <&-"];
     for shell in shells {

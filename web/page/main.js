@@ -193,7 +193,7 @@ function receive(side, { error, none, compiling, begins, frame }) {
   } else if (frame) {
     frame.ended.forEach((row) => side.rows.set(row.member, row));
     side.film.add({ nodes: frame.nodes, done: frame.done });
-    Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
+    Object.assign(side, { frame, drawn: false, over: !frame.continues });
     const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
     side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
     side.tiles.canvas.ariaLabel = `${side.label}: ${frame.done} of ${side.begins.members} members have ended`;

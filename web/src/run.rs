@@ -157,7 +157,7 @@ impl Run {
         let dispatch = if let Device::Gpu(gpu) = device { gpu.fetch(kept) } else { None };
         self.since = Instant::now();
         let frame = self.watched.is_due || !self.continues;
-        Ok(json!({ "goesOn": self.continues, "dispatch": dispatch, "frame": frame }))
+        Ok(json!({ "continues": self.continues, "dispatch": dispatch, "frame": frame }))
     }
 
     /// Takes what came back from the GPU.
@@ -203,7 +203,7 @@ impl Run {
         Ok(json!({
             "ended": new.iter().map(|ended| self.row(ended)).collect::<Vec<_>>(),
             "done": self.ended.len(),
-            "goesOn": self.continues,
+            "continues": self.continues,
             "rests": self.rests.len(),
             "mean": self.mean(),
             "times": self.relaxed,

@@ -252,7 +252,7 @@ pub(super) enum Waited {
     /// The work is done.
     Done,
     /// The work is still in progress.
-    OnItsWay,
+    Pending,
 }
 
 impl OpenGpu {
@@ -294,7 +294,7 @@ impl OpenGpu {
         self.check()?;
         match polled {
             Ok(_) => Ok(Waited::Done),
-            Err(wgpu::PollError::Timeout) => Ok(Waited::OnItsWay),
+            Err(wgpu::PollError::Timeout) => Ok(Waited::Pending),
             Err(error) => Err(self.error(&format!("a dispatch was not taken ({error})"))),
         }
     }

@@ -68,10 +68,10 @@ impl Trajectory<'_> {
         };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         // What happens to a curve at rest takes nothing from its time; one that is driven to a point is never at rest.
-        let on_its_way = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
+        let is_vanishing = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
         let status = match failed {
             Some(Status::Vanished) => Status::Vanished,
-            Some(failed) if on_its_way && failed != Status::Relaxed => failed,
+            Some(failed) if is_vanishing && failed != Status::Relaxed => failed,
             _ if t_relax.is_some() => Status::Relaxed,
             failed => failed.unwrap_or(Status::Unfinished),
         };

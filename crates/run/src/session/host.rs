@@ -16,7 +16,7 @@ pub trait Host {
     /// If the system has no means for it.
     fn options(&self) -> Result<ReportOptions>;
     /// The options of a run that `stop` stops.
-    fn manner_with(&self, stop: Stop) -> ReportOptions;
+    fn options_with(&self, stop: Stop) -> ReportOptions;
     /// Asked several times a second while a run is prepared; an error ends it.
     ///
     /// # Errors

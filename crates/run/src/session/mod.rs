@@ -69,7 +69,7 @@ fn complete(session: Session, host: &dyn Host) -> Result<Completed> {
         Err(Error::Device(fault)) if falls_back => {
             let why = format!("the GPU failed: {fault}");
             host.say(&format!("note: on the CPU from here on: {why}"));
-            match Begun::open(&path)?.resume_on_cpu(why, host.manner_with(stop), host)? {
+            match Begun::open(&path)?.resume_on_cpu(why, host.options_with(stop), host)? {
                 Some(session) => session.carry_out(host),
                 None => Err(Error::Device(fault)),
             }

@@ -47,7 +47,8 @@ impl FinishedRun<'_> {
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
         };
-        let raw = if self.statistics.of_limits { "; t_relax is that of the run, at its n" } else { "" };
+        let of_run = format!("; t_relax is that of this run, at n = {}", self.spec().points);
+        let raw = if self.statistics.of_limits { &of_run } else { "" };
         PageTable {
             caption: format!("Each member{raw}"),
             note: String::new(),
