@@ -481,8 +481,13 @@ impl Colours {
         }
         let known = |value: &f64| Scale::Linear.holds(*value);
         let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
-        let name = if given.is_some() || cells.names.len() == count { &cells.name[..] } else { "cell" };
-        let key = CellKey { names: if given.is_some() { Vec::new() } else { key.names }, ..key };
+        let names = if given.is_none() && key.names.len() == count { key.names } else { Vec::new() };
+        let names = distinct(&names, SIZE, MAX_NAME);
+        // Names that stay wide leave no room for curves.
+        let fit = names.iter().all(|name| width(name, SIZE) <= MAX_NAME);
+        let names = if fit { names } else { Vec::new() };
+        let name = if given.is_some() || !names.is_empty() { &cells.name[..] } else { "cell" };
+        let key = CellKey { names, ..key };
         let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
         let scale = Scale::of(values.iter().copied());
         let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
@@ -543,11 +548,8 @@ impl Colours {
     /// Names next to a colour bar of this height, with the numbers of their curves: as many as there is room for.
     fn names(&self, height: f64) -> Vec<(f64, String)> {
         let names = &self.key.names;
-        let step = names.len().div_ceil((height / LINE) as usize).max(1);
-        let shown: Vec<(usize, &String)> = names.iter().enumerate().step_by(step).collect();
-        let texts: Vec<String> = shown.iter().map(|(_, name)| name.to_string()).collect();
-        let texts = distinct(&texts, SIZE, MAX_NAME);
-        shown.iter().map(|(i, _)| *i as f64).zip(texts).collect()
+        let step = names.len().div_ceil(((height / LINE) as usize).max(1)).max(1);
+        names.iter().enumerate().step_by(step).map(|(i, name)| (i as f64, name.clone())).collect()
     }
 
     /// Draws the colour bar at the right of a panel.
