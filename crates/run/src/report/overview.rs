@@ -399,7 +399,7 @@ results    out: summary.csv, run.json
             nodes(&tally)
         };
         assert_eq!(add(0, 100, true), None);
-        assert_eq!(add(1, 100, false).as_deref(), Some("the errors of 1 of 2 members are bounds"));
+        assert_eq!(add(1, 100, false).as_deref(), Some("t_error of 1 of 2 members is a wide bound"));
         assert_eq!(
             add(2, 283, true).as_deref(),
             Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
