@@ -67,6 +67,19 @@ pub fn shortened(text: &str, size: f64, most: f64) -> String {
     short.trim_end().to_owned() + "…"
 }
 
+/// `text` in at most `most` pixels, with its beginning and its end: the ends of names may be all that differs.
+pub fn shortened_inside(text: &str, size: f64, most: f64) -> String {
+    if width(text, size) <= most {
+        return text.to_owned();
+    }
+    let all: Vec<char> = text.chars().collect();
+    let of = |kept: usize| -> String {
+        let (start, end) = (kept.div_ceil(2), all.len() - kept / 2);
+        all[..start].iter().chain(&['…']).chain(&all[end..]).collect()
+    };
+    (0..all.len()).rev().map(of).find(|short| width(short, size) <= most).unwrap_or("…".into())
+}
+
 /// Each of `texts` in at most `most` pixels, unless two that differ would then be equal: what all have in common at
 /// their beginning goes first, and if that is not enough, they keep their width.
 pub fn distinct(texts: &[String], size: f64, most: f64) -> Vec<String> {
@@ -102,6 +115,18 @@ mod tests {
         assert_eq!(lines[..2], ["one two", "three"]);
         assert_eq!(lines[2..].concat(), "incomprehensibilities");
         assert_eq!(wrapped("  ", SIZE, 60.0), [""; 0]);
+    }
+
+    #[test]
+    fn a_text_cut_inside_keeps_both_ends() {
+        let texts = ["a-long-common-beginning-of-islands-1", "a-long-common-beginning-of-islands-2"];
+        let cut = texts.map(|text| shortened_inside(text, SIZE, 120.0));
+        assert!(cut.iter().all(|text| width(text, SIZE) <= 120.0 && text.starts_with("a-long-") && text.contains('…')));
+        assert!(cut[0].ends_with("-1") && cut[1].ends_with("-2"), "{cut:?}");
+        let ends = texts.map(|text| shortened(text, SIZE, 120.0));
+        assert_eq!(ends[0], ends[1], "the control: cut at the end they are equal");
+        assert_eq!(["b", "žé"].map(|text| shortened_inside(text, SIZE, 60.0)), ["b", "žé"]);
+        assert_eq!(shortened_inside("wide", SIZE, 1.0), "…");
     }
 
     #[test]

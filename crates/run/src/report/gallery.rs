@@ -7,7 +7,7 @@ use curvelax_curve::polygon;
 use curvelax_draw::{
     medium::Medium,
     svg::{Svg, closed_path, coordinate, dots},
-    width::shortened,
+    width::{shortened, shortened_inside, width},
 };
 use curvelax_ensemble::study::PORTRAITS;
 use curvelax_files::portraits::Film;
@@ -16,7 +16,7 @@ use curvelax_files::portraits::Film;
 pub const MAX_PANELS: usize = PORTRAITS;
 
 /// Maximum characters of the name of a member.
-const MAX_NAME: usize = 24;
+const MAX_NAME: usize = 120;
 const COLUMNS: usize = 4;
 /// Width and maximum height of a panel on a screen in pixels, and the least on paper.
 const SIDE: f64 = 200.0;
@@ -231,12 +231,12 @@ fn draw_panel(
     let Film { status, points, .. } = panel.film;
     svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
-    let mut name = panel.film.name(MAX_NAME);
+    let mut across = String::new();
     if let Some((low, high)) = panel.bounds() {
         let own = (high - low).max_element();
         let scale = layout.scale(own);
         if layout.common.is_none() {
-            name += &format!(", {}{unit} across", rounded(own));
+            across = format!(", {}{unit} across", rounded(own));
         }
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
@@ -254,6 +254,8 @@ fn draw_panel(
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
+    let room = layout.side() - width(&across, SIZE);
+    let name = shortened_inside(&panel.film.name(MAX_NAME), SIZE, room) + &across;
     svg.text("middle", below, &shortened(&name, SIZE, layout.side()));
     svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
     let lines = if cell.is_empty() { 1.0 } else { 2.0 };
