@@ -568,8 +568,7 @@ fn extrapolated_steps_have_their_orders() {
             let [a, b, c] = [1, 2, 4].map(|times| of(times * steps));
             let found = ((a - b) / (b - c)).abs().log2();
             println!("{name}: order {order}: {found:.3}, differences {:.1e} {:.1e}", a - b, b - c);
-            // Some errors fall faster. On an ellipse stiff modes, which the redistribution stirs, reduce orders above
-            // 2.
+            // Some errors fall faster. On an ellipse stiff modes, stirred by redistribution, reduce orders above 2.
             let stirred = name.contains("ellipse");
             let least = if stirred { 1.7 } else { f64::from(order) - 0.8 };
             assert!((stirred && order > 3) || found > least, "{name}: order {found} instead of {order}");
