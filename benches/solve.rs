@@ -1,4 +1,5 @@
-//! The cost of a step compared with the fastest loop for its two solves alone: `cargo bench -p curvelax-benches --bench solve`.
+//! The cost of a step compared with the fastest loop for its two solves alone: `cargo bench -p curvelax-benches --bench
+//! solve`.
 //!
 //! The loop is written for this purpose only: bands ready in memory, fused multiply-adds, the widest vectors, one
 //! thread. It solves the same systems as a step, a periodic pentadiagonal one for k and one for x and y, and does

@@ -2,10 +2,11 @@
 //!
 //!     cargo run --release --example kernels -- --points 100 --out kernels
 //!
-//! Writes `SOLVER[-adaptive][-geometric|-crystal][-forced][-subgroup]-PRECISION-nN` with the endings `.wgsl`, `.spv`, `.metal` and `.hlsl`. WGSL has
-//! `override` constants for its sizes; the other formats have them filled in. `kernels.json` names the constants of each
-//! kernel with their values. In front of a kernel of one subgroup, WGSL by the standard wants `enable subgroups;`, which
-//! naga refuses. Metal and HLSL are written in f32 only: Metal has no f64, and naga's HLSL is tested without.
+//! Writes `SOLVER[-adaptive][-geometric|-crystal][-forced][-subgroup]-PRECISION-nN` with the endings `.wgsl`, `.spv`,
+//! `.metal` and `.hlsl`. WGSL has `override` constants for its sizes; the other formats have them filled in.
+//! `kernels.json` names the constants of each kernel with their values. In front of a kernel of one subgroup, WGSL by
+//! the standard wants `enable subgroups;`, which naga refuses. Metal and HLSL are written in f32 only: Metal has no
+//! f64, and naga's HLSL is tested without.
 
 use std::{
     collections::BTreeMap,

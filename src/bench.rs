@@ -1,9 +1,9 @@
 //! Measures how fast a back end advances curves, in curve-steps per second.
 //!
-//! A curve-step is one step of the paper's scheme for one curve; an attempt of an adaptive step makes several. A [`Bench`]
-//! fills the slots of a back end with members of the default family and advances them through the same calls as a run: `load`,
-//! `aim`, `advance`, and a look at the counters. Other work of a run (making members, checking for crossings, outputs)
-//! is left out. All numbers count steps made, not steps requested.
+//! A curve-step is one step of the paper's scheme for one curve; an attempt of an adaptive step makes several. A
+//! [`Bench`] fills the slots of a back end with members of the default family and advances them through the same calls
+//! as a run: `load`, `aim`, `advance`, and a look at the counters. Other work of a run (making members, checking for
+//! crossings, outputs) is left out. All numbers count steps made, not steps requested.
 
 use std::time::{Duration, Instant};
 
@@ -81,7 +81,7 @@ impl Bench {
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);
         let member = |index: usize| {
             let mut run = Trajectory::new(family.member(index as u64)?, spec, precision, &Outputs::default()).launch();
-            // Nobody checks for crossings here, so members need not wait for that.
+            // Nothing checks for crossings here, so members need not wait for that.
             run.parameters.look_at = BIG;
             Ok(run)
         };

@@ -1,5 +1,5 @@
-//! What is released: names of archives, versions and addresses agree, the paper has the form that JOSS asks for, and the
-//! site has every page.
+//! What is released: names of archives, versions and addresses agree, the paper has the form that JOSS asks for, and
+//! the site has every page.
 
 use std::{
     collections::BTreeSet,

@@ -682,7 +682,7 @@ class Machine:
         w.groups[pc] = w.groups.get(pc, 0) | mask
 
     def release(self, w):
-        """Lets go on whoever waits at a BSYNC for nobody any more."""
+        """Releases the threads at a BSYNC that wait for no other any more."""
         for pc, (mask, register) in list(w.at_bsync.items()):
             lane = (mask & -mask).bit_length() - 1
             if w.b[register][lane] & w.live & ~mask == 0:

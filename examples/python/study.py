@@ -88,7 +88,7 @@ def fit(table):
 
 
 def draw(table, snapshots, path):
-    """Survival by amplitude, t_relax against amplitude with the fit, and one member on its way."""
+    """Survival by amplitude, t_relax against amplitude with the fit, and one member over time."""
     plt.rcParams.update({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False})
     figure, (left, middle, right) = plt.subplots(1, 3, figsize=(12, 4), layout="constrained")
     amplitudes = sorted(table.amplitude.unique())

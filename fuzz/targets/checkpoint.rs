@@ -1,4 +1,5 @@
-//! The state that `resume` goes on from: as it is on disk, and, behind a byte `s`, with a right checksum round any body.
+//! The state that `resume` continues from: as it is on disk, and, behind a byte `s`, with a right checksum round any
+//! body.
 
 #![no_main]
 
@@ -38,12 +39,12 @@ fuzz_target!(|data: &[u8]| {
         };
         sealed(*LAYOUT, write).expect("no error can be made")
     });
-    let Ok((head, standing)) = from_bytes(body.as_deref().unwrap_or(data)) else { return };
+    let Ok((head, progress)) = from_bytes(body.as_deref().unwrap_or(data)) else { return };
     // What is read is written and read back the same.
-    let resident = standing.resident.clone().unwrap_or_default();
-    let again = to_bytes(&head, &standing, &resident).expect("bytes");
-    let (same, standing_again) = from_bytes(&again).expect("its own bytes");
-    assert_eq!(format!("{head:?} {standing:?}"), format!("{same:?} {standing_again:?}"));
+    let resident = progress.resident.clone().unwrap_or_default();
+    let again = to_bytes(&head, &progress, &resident).expect("bytes");
+    let (same, progress_again) = from_bytes(&again).expect("its own bytes");
+    assert_eq!(format!("{head:?} {progress:?}"), format!("{same:?} {progress_again:?}"));
     let (spec, member) = &*START;
     let outputs = Outputs::default();
     for paused in resident.into_values() {

@@ -1,6 +1,6 @@
-//! What `merge` reads: `shard.state` with a right checksum round any body (behind a byte `s`), and the tables of two shards
-//! (behind `t`, with a NUL between them), as they are or each with the length and the checksum that its shard tells of
-//! (behind `c`).
+//! What `merge` reads: `shard.state` with a right checksum round any body (behind a byte `s`), and the tables of two
+//! shards (behind `t`, with a NUL between them), as they are or each with the length and the checksum that its shard
+//! tells of (behind `c`).
 
 #![no_main]
 
@@ -20,14 +20,14 @@ use curvelax::{
         names,
         part_file::Mark,
         state::{
-            checkpoint::{Head, Origin},
+            checkpoint::{CheckpointHead, Origin},
             envelope::sealed,
             shard::{FinishedShard, Found, LAYOUT, Record, from_bytes, look, to_bytes},
         },
     },
     placement::Platform,
     report::merge::{Shards, join_rows},
-    results::tally::Aside,
+    results::tally::TallySupplement,
 };
 use libfuzzer_sys::fuzz_target;
 
@@ -61,7 +61,7 @@ fn state(body: &[u8]) {
         one.hold(names::SHARD, &again);
         // Beside a right one, which it may be of the same study with.
         let found = [&*one, other].into_iter().map(|shard| look(&shard.path)).collect::<Result<Vec<_>, _>>();
-        one_line(found.and_then(Shards::new).map(|shards| shards.told()));
+        one_line(found.and_then(Shards::new).map(|shards| shards.in_words()));
         let record = one.record.clone();
         one.hold(names::SHARD, &to_bytes(&record.head, record.points, &record.warnings).expect("bytes"));
     });
@@ -126,8 +126,9 @@ impl Folder {
             started: Duration::ZERO,
         };
         let tables = TABLES.map(|name| Mark { name: name.into(), length: 0, crc: 0 }).into();
-        let (wall, aside) = (Duration::ZERO, Aside::default());
-        let head = Head { origin, wall, stage: 0, tables, store: None, rows: None, aside, films: Vec::new() };
+        let (wall, supplement) = (Duration::ZERO, TallySupplement::default());
+        let head =
+            CheckpointHead { origin, wall, stage: 0, tables, store: None, rows: None, supplement, films: Vec::new() };
         let files = [names::SHARD].into_iter().chain(TABLES);
         let files = files.map(|name| (name, File::create(path.join(name)).unwrap())).collect();
         let record = Record { head, points: 100, warnings: Vec::new() };

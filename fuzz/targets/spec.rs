@@ -1,4 +1,5 @@
-//! The text of a spec file: whatever it says, it is read or refused, and what was read is written and read back the same.
+//! The text of a spec file: whatever it says, it is read or refused, and what was read is written and read back the
+//! same.
 
 #![no_main]
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use curvelax::{
     Error, Result,
     files::{columns::columns, names, reader::Finished, zarr},
-    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, told},
+    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, missing_letters},
     report::pictures,
     results::EnsembleStatistics,
     statistics::{KaplanMeier, Observation, Sample, Step},
@@ -68,7 +68,7 @@ impl FinishedRun {
             return Err(Error::Request(format!("{place}: the run has no picture of this name, or its files are gone")));
         };
         let print = Printer::default().read(&picture.figure.title, &picture.figure.svg, width)?;
-        Ok((print.file(format)?, told(&print.missing())))
+        Ok((print.file(format)?, missing_letters(&print.missing())))
     }
 }
 
@@ -158,8 +158,8 @@ impl FinishedRun {
         Ok(all.into_iter().map(|(name, json)| (name, json.to_string())).collect())
     }
 
-    /// The picture `name` as the file for a paper, with the extension `.png` or `.pdf`, and what is said of letters that
-    /// it lacks.
+    /// The picture `name` as the file for a paper, with the extension `.png` or `.pdf`, and what is said of letters
+    /// that it lacks.
     ///
     /// # Errors
     /// `RequestError` for another extension, width or density, and for a picture that the run has not.

@@ -7,26 +7,26 @@ use std::{
 
 use curvelax::{
     ensemble::Snapshot,
-    report::{Cause, Form, Manner, Progress, Stop},
+    report::{Cause, Progress, ReportOptions, ResultFormat, Stop},
     session::Host,
 };
 use pyo3::prelude::*;
 
-use crate::seen::Seen;
+use crate::seen::SnapshotBuffer;
 
 /// Time between two looks at Python: its lock is not free.
 const PERIOD: Duration = Duration::from_millis(50);
-/// A run that is asked to stop has this time to reach a point where all its work is saved: nobody waits longer than a
-/// second in a notebook.
+/// A run that is asked to stop has this time to reach a point where all its work is saved: no caller waits longer than
+/// a second in a notebook.
 const PATIENCE: Duration = Duration::from_millis(600);
 /// Time between checkpoints.
 const EVERY: Duration = Duration::from_secs(5);
 
-/// The functions that hear of a run.
+/// The functions that are called during a run.
 pub struct Notebook {
     shared: Arc<Shared>,
-    seen: Mutex<Seen>,
-    /// When Python was last asked whether to go on.
+    seen: Mutex<SnapshotBuffer>,
+    /// When Python was last asked whether to continue.
     asked: Mutex<Option<Instant>>,
 }
 
@@ -70,12 +70,12 @@ impl Notebook {
     ///
     /// # Errors
     /// Those.
-    pub fn heard(&self, py: Python<'_>) -> PyResult<()> {
+    pub fn check_calls(&self, py: Python<'_>) -> PyResult<()> {
         self.raised().map_or_else(|| py.check_signals(), Err)
     }
 
     /// Moves out the snapshots.
-    pub fn seen(&self) -> Seen {
+    pub fn seen(&self) -> SnapshotBuffer {
         std::mem::take(&mut *lock(&self.seen))
     }
 }
@@ -85,15 +85,15 @@ impl Host for Notebook {
         self.shared.ask(|py| self.shared.say.call1(py, (line,)).map(drop));
     }
 
-    fn form(&self) -> Form {
-        Form::Overview
+    fn form(&self) -> ResultFormat {
+        ResultFormat::Overview
     }
 
-    fn manner(&self) -> curvelax::Result<Manner> {
-        Ok(self.manner_with(self.shared.stop.clone()))
+    fn options(&self) -> curvelax::Result<ReportOptions> {
+        Ok(self.options_with(self.shared.stop.clone()))
     }
 
-    fn manner_with(&self, stop: Stop) -> Manner {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (shared, mut last) = (self.shared.clone(), None::<Instant>);
         let told = move |done: u64, total: u64, share: f64| {
             if last.is_none_or(|last| last.elapsed() >= PERIOD) {
@@ -101,16 +101,16 @@ impl Host for Notebook {
                 shared.ask(|py| shared.progress.call1(py, (done, total, share)).map(drop));
             }
         };
-        Manner {
+        ReportOptions {
             since: Instant::now(),
-            progress: Progress::Told(Box::new(told)),
+            progress: Progress::Callback(Box::new(told)),
             every: EVERY,
             stop,
             patience: PATIENCE,
         }
     }
 
-    fn go_on(&self) -> curvelax::Result<()> {
+    fn may_continue(&self) -> curvelax::Result<()> {
         let is_due = lock(&self.asked).is_none_or(|last| last.elapsed() >= PERIOD);
         if is_due {
             *lock(&self.asked) = Some(Instant::now());

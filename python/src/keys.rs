@@ -102,7 +102,7 @@ impl Keys {
         Ok(spec)
     }
 
-    /// The message of toml with the line that is wrong instead of its number, in a text that nobody wrote.
+    /// The message of toml with the line that is wrong instead of its number, in a text that no user wrote.
     fn without_place(&self, message: &str) -> String {
         let number = message.strip_prefix("TOML parse error at line ").and_then(|rest| rest.split(',').next());
         let line = number.and_then(|number| self.text.lines().nth(number.parse::<usize>().ok()?.checked_sub(1)?));

@@ -29,8 +29,8 @@ fn raise(py: Python<'_>, error: curvelax::Error, raised: Option<PyErr>) -> PyErr
     }
 }
 
-/// Refuses a process that was forked from one in which curvelax has worked: the threads of a process are not forked, and
-/// would be waited for without end.
+/// Refuses a process that was forked from one in which curvelax has worked: the threads of a process are not forked,
+/// and would be waited for without end.
 ///
 /// # Errors
 /// `RequestError`.
@@ -99,26 +99,27 @@ mod _curvelax {
         existing: &str,
         progress: Py<PyAny>,
         say: Py<PyAny>,
-    ) -> PyResult<(String, Seen)> {
+    ) -> PyResult<(String, SnapshotBuffer)> {
         unforked(py)?;
         let keys = Keys::read(spec.as_deref(), keys)?;
         let existing = treatment(existing);
         let host = Notebook::new(progress, say);
         let done = py.detach(|| {
             let spec = keys.spec()?;
-            let manner = host.manner()?;
+            let options = host.options()?;
             OutputFolder::check_place(&out, existing)?;
-            let placed = PlacedStudy::of(RunPlan::new(spec, Some(&manner), &host)?)?;
+            let placed = PlacedStudy::of(RunPlan::new(spec, Some(&options), &host)?)?;
             placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
-            session::begin(placed, &out, existing, manner, &host)
+            session::begin(placed, &out, existing, options, &host)
         });
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
         tell_verdict(&host, &completed);
-        host.heard(py)?;
+        host.check_calls(py)?;
         Ok((completed.text, host.seen()))
     }
 
-    /// Warns if a run does not hold what was asked for, where the program has exit code 3: its results are there to look at.
+    /// Warns if a run does not hold what was asked for, where the program has exit code 3: its results are there to
+    /// look at.
     fn tell_verdict(host: &Notebook, completed: &Completed) {
         if let Err(error) = completed.verdict.check(false, &completed.out.join(names::SUMMARY)) {
             host.say(&format!("warning: {error}"));
@@ -133,12 +134,12 @@ mod _curvelax {
         let done = py.detach(|| session::resume(&out, ResumePlace::default(), &host));
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
         completed.iter().for_each(|completed| tell_verdict(&host, completed));
-        host.heard(py)?;
+        host.check_calls(py)?;
         Ok(completed.map(|completed| completed.text))
     }
 
     #[pymodule_export]
     use super::finished::FinishedRun;
     #[pymodule_export]
-    use super::seen::Seen;
+    use super::seen::SnapshotBuffer;
 }

@@ -10,12 +10,12 @@ const MOST: usize = 512 << 20;
 /// The snapshots of a run, member by member.
 #[pyclass(frozen)]
 #[derive(Default)]
-pub struct Seen {
+pub struct SnapshotBuffer {
     all: Vec<Snapshot>,
     bytes: usize,
 }
 
-impl Seen {
+impl SnapshotBuffer {
     /// Adds snapshots, unless there are too many.
     pub fn add(&mut self, snapshots: &[Snapshot]) {
         self.bytes += snapshots.iter().map(|one| 4 * size_of_val(&*one.x)).sum::<usize>();
@@ -28,7 +28,7 @@ impl Seen {
 }
 
 #[pymethods]
-impl Seen {
+impl SnapshotBuffer {
     /// The fields x, y, k and r of the `members` at the `times`, as arrays of member × time × node, NaN where there is
     /// no snapshot; or `None` if the snapshots were too many for memory.
     fn arrays<'py>(

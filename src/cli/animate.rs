@@ -8,7 +8,7 @@ use crate::{
     files::{OutputFolder, Owner, names, reader},
     report::{
         gallery::MAX_PANELS,
-        movie::{Cut, HOLD, MOST_SECONDS, Movie, SECONDS, WIDTH, WIDTHS},
+        movie::{HOLD, MAX_SECONDS, Movie, MovieOptions, SECONDS, WIDTH, WIDTHS},
     },
     text::{bytes, count, number},
 };
@@ -110,9 +110,9 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
 }
 
 /// Checks the numbers.
-fn cut(args: &AnimateArgs) -> Result<Cut> {
+fn cut(args: &AnimateArgs) -> Result<MovieOptions> {
     let AnimateArgs { seconds, width, members, .. } = *args;
-    let [least, most] = MOST_SECONDS;
+    let [least, most] = MAX_SECONDS;
     if !(least..=most).contains(&seconds) {
         return Err(Error::value("seconds", seconds, "out of range", &format!("use {least} to {most}")));
     }
@@ -123,7 +123,7 @@ fn cut(args: &AnimateArgs) -> Result<Cut> {
     if !(1..=MAX_PANELS).contains(&members) {
         return Err(Error::value("members", members, "out of range", &format!("use 1 to {MAX_PANELS}")));
     }
-    Ok(Cut { seconds, width, members })
+    Ok(MovieOptions { seconds, width, members })
 }
 
 /// The file of the movie, in its open folder.

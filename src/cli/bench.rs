@@ -41,8 +41,8 @@ pub struct BenchArgs {
     /// Nodes per member, n; several values are measured in turn [default: 100]
     #[arg(long, value_name = "N1,N2,...", value_delimiter = ',', value_parser = parsers::whole::<usize>, allow_hyphen_values = true)]
     points: Vec<usize>,
-    /// Members resident at once, limited by the slots of the back end [default: 8192 on hardware GPUs, 32 on software ones, all
-    /// slots of the CPU]
+    /// Members resident at once, limited by the slots of the back end [default: 8192 on hardware GPUs, 32 on software
+    /// ones, all slots of the CPU]
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<u64>, allow_hyphen_values = true)]
     curves: Option<u64>,
     /// Measuring time per case, in seconds [default: 2]
@@ -63,8 +63,8 @@ pub struct BenchArgs {
     /// Back ends [default: the CPU and every GPU adapter, software ones included]
     #[arg(long, value_name = "WHERE,...", value_delimiter = ',', value_parser = parsers::name::<DeviceKind>(&DeviceKind::NAMES, &[]), help_heading = flags::MACHINE)]
     backend: Vec<DeviceKind>,
-    /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only with
-    /// --backend [default: all]
+    /// GPU adapters to measure: part of the name, or the number in `curvelax adapters`. The CPU is then measured only
+    /// with --backend [default: all]
     #[arg(long, value_name = "NAME", help_heading = flags::MACHINE)]
     adapter: Option<String>,
     /// Number types [default: f64,f32]

@@ -26,7 +26,7 @@ use crate::{
         tables::Table,
         truth_tables::{CostRow, ErrorRow},
     },
-    paper::{Printer, told},
+    paper::{Printer, missing_letters},
     placement,
     text::significant,
     truth::{ConvergenceRow, Problem, WorkPrecision, WorkRow, problems, studies},
@@ -55,7 +55,7 @@ direct, and minutes with plain sweeps.
 --referee solves the same flow by tangent angle and length, with Fourier coefficients and steps of order 8, twice, until
 both solutions agree to 1e-6. It refuses curves with corners and curves that become singular. For one curve the table has
 t_relax at n = 50, 100 and 200 (adaptive steps, 1e-5), whose error should fall at order 2, and t_limit; with --curves it has
-the t_limit of every member. The error of t_limit is also told in bars, its half-width t_error.";
+the t_limit of every member. The error of t_limit is also missing_letters in bars, its half-width t_error.";
 
 /// Solve problems with exact solutions; print errors and observed orders as a table.
 #[derive(clap::Args)]
@@ -81,7 +81,8 @@ pub struct ConvergenceArgs {
     /// Number type [default: f64 where the device has it]
     #[arg(long, value_name = "TYPE", value_parser = parsers::word::<Precision>(), help_heading = flags::MACHINE)]
     precision: Option<Precision>,
-    /// Folder for convergence.csv, work_precision.csv and .svg, or referee.csv, which must not exist yet [default: no file]
+    /// Folder for convergence.csv, work_precision.csv and .svg, or referee.csv, which must not exist yet [default: no
+    /// file]
     #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
     /// Write into an existing DIR, replacing these files in it
@@ -219,7 +220,10 @@ fn work_precision(
             for (extension, content) in prints.of(&Printer::default(), (WORK_TITLE, &svg), &mut missing)? {
                 files.push(folder.write(&work_picture(extension), content)?);
             }
-            told(&missing).iter().filter(|_| !quiet).for_each(|told| note(&format!("note: {told}")));
+            missing_letters(&missing)
+                .iter()
+                .filter(|_| !quiet)
+                .for_each(|missing_letters| note(&format!("note: {missing_letters}")));
         }
         folder.publish_all(files)?;
     }

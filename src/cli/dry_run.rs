@@ -1,6 +1,6 @@
 //! `curvelax run --dry-run`: the predicted cost of a run, as a table or as JSON; nothing is written.
 
-use super::{manner::MannerFlags, print, print_json};
+use super::{print, print_json, report_flags::ReportFlags};
 use crate::{
     ensemble::Spec,
     error::Result,
@@ -14,7 +14,7 @@ use crate::{
 ///
 /// # Errors
 /// Those of the run itself, and that of the stop.
-pub fn dry_run(placed: PlacedStudy, stop: &Stop, host: &MannerFlags) -> Result<()> {
+pub fn dry_run(placed: PlacedStudy, stop: &Stop, host: &ReportFlags) -> Result<()> {
     placed.warnings().iter().for_each(|warning| host.say(&format!("warning: {warning}")));
     let PlacedStudy { study, choices, .. } = placed;
     let stopped = || Some(stop.asked()?.0.error(" in the pilot: nothing is saved"));

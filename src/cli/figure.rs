@@ -15,7 +15,7 @@ use crate::{
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
     files::{OutputFolder, Owner, tables::SnapshotTable},
-    paper::{Printer, told},
+    paper::{Printer, missing_letters},
     report::progress::Progress,
 };
 
@@ -85,7 +85,7 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     if args.quiet {
         return Ok(());
     }
-    told(&missing).iter().for_each(|told| note(&format!("note: {told}")));
+    missing_letters(&missing).iter().for_each(|missing_letters| note(&format!("note: {missing_letters}")));
     print(&format!("{}\nresults  {}: {}\n", table(&made), args.out.display(), names.join(", ")))
 }
 

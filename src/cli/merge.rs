@@ -5,12 +5,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{flags, manner::check_name, parsers, print};
+use super::{flags, parsers, print, report_flags::check_name};
 use crate::{
     error::{Error, Result},
     files::{OutputFolder, names, state::shard},
     report::{
-        Form,
+        ResultFormat,
         merge::{Shards, listed_ranges},
     },
     text::{plural, quoted},
@@ -65,7 +65,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
     check_name(args.json, &out)?;
     check_place(&out, &args.shards)?;
     let folder = OutputFolder::open(&out, args.force)?;
-    let form = if args.json { Form::Json } else { Form::Overview };
+    let form = if args.json { ResultFormat::Json } else { ResultFormat::Overview };
     let (text, verdict) = shards.merge(&folder, form)?;
     if args.json || !args.quiet {
         print(&text)?;
@@ -81,7 +81,7 @@ fn missing(shards: &Shards, script: &Path) -> String {
     }
     let array = listed_ranges(&missing);
     let submit = format!("sbatch --array={array} --export=ALL,{}={count} {}", parsers::SHARDS, quoted(script));
-    shards.told().into_iter().chain([submit]).map(|line| line + "\n").collect()
+    shards.in_words().into_iter().chain([submit]).map(|line| line + "\n").collect()
 }
 
 /// Refuses to write the results into a shard, whose files they would replace.

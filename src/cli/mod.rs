@@ -13,12 +13,12 @@ mod dry_run;
 mod figure;
 mod flags;
 mod man;
-mod manner;
 mod merge;
 mod paper;
 mod parsers;
 mod plot;
 mod referee;
+mod report_flags;
 mod resume;
 mod run;
 mod signals;
@@ -101,7 +101,8 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     code
 }
 
-/// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags and [suggests](unknown::suggest) values.
+/// Does the same as `Cli::try_parse_from`, but [explains](unknown::explain) unknown flags and
+/// [suggests](unknown::suggest) values.
 fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli, clap::Error> {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let program = Cli::command();

@@ -12,7 +12,7 @@ use crate::{
 
 /// The formats of pictures.
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum PictureFormat {
+enum PictureFormat {
     Svg,
     Png,
     Pdf,
@@ -21,7 +21,7 @@ pub(super) enum PictureFormat {
 /// The flags of commands that draw a picture next to its data.
 #[derive(clap::Args)]
 pub(super) struct PaperFlags {
-    /// Formats of the picture: svg for screens, png and pdf for papers [default: svg]
+    /// Formats of the pictures: svg for screens, png and pdf for papers [default: svg]
     #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', value_enum, help_heading = flags::OUTPUT)]
     format: Vec<PictureFormat>,
     /// Width of png and pdf: column (85 mm), page (170 mm) or 80 to 300 mm [default: column]
@@ -43,10 +43,27 @@ impl PaperFlags {
         self.format.is_empty() || self.format.contains(&PictureFormat::Svg)
     }
 
+    /// Returns what pictures for papers are made of.
+    ///
     /// # Errors
-    /// Those of [`Prints::new`].
+    /// [`Error::Request`] for a wrong width or density, and for one that no format uses.
     pub(super) fn prints(&self) -> Result<Prints> {
-        Prints::new(&self.format, self.width.as_deref(), self.dpi)
+        let has = |format: PictureFormat| self.format.contains(&format);
+        let unused = |key: &str, value: &dyn std::fmt::Display, formats: &str| {
+            Err(Error::value(key, value, "no picture uses it", &format!("add --format {formats}, or leave it out")))
+        };
+        let png = PaperFormat::png(self.dpi.unwrap_or(USUAL_DPI))?;
+        let width = self.width.as_deref().map(str::parse).transpose()?.unwrap_or_default();
+        match (&self.width, self.dpi) {
+            (Some(width), _) if !has(PictureFormat::Png) && !has(PictureFormat::Pdf) => {
+                return unused("width", width, "png, or pdf");
+            }
+            (_, Some(dpi)) if !has(PictureFormat::Png) => return unused("dpi", &dpi, "png"),
+            _ => {}
+        }
+        let formats = [(PictureFormat::Png, ("png", png)), (PictureFormat::Pdf, ("pdf", PaperFormat::Pdf))];
+        let formats = formats.into_iter().filter(|(format, _)| has(*format)).map(|(_, paper)| paper).collect();
+        Ok(Prints { width, formats })
     }
 }
 
@@ -58,27 +75,6 @@ pub(super) struct Prints {
 }
 
 impl Prints {
-    /// # Errors
-    /// [`Error::Request`] for a wrong width or density, and for one that no format uses.
-    pub(super) fn new(asked: &[PictureFormat], width: Option<&str>, dpi: Option<i64>) -> Result<Prints> {
-        let has = |format: PictureFormat| asked.contains(&format);
-        let unused = |key: &str, value: &dyn std::fmt::Display, formats: &str| {
-            Err(Error::value(key, value, "no picture uses it", &format!("add --format {formats}, or leave it out")))
-        };
-        let png = PaperFormat::png(dpi.unwrap_or(USUAL_DPI))?;
-        let paper = width.map(str::parse).transpose()?.unwrap_or_default();
-        match (width, dpi) {
-            (Some(width), _) if !has(PictureFormat::Png) && !has(PictureFormat::Pdf) => {
-                return unused("width", &width, "png, or pdf");
-            }
-            (_, Some(dpi)) if !has(PictureFormat::Png) => return unused("dpi", &dpi, "png"),
-            _ => {}
-        }
-        let formats = [(PictureFormat::Png, ("png", png)), (PictureFormat::Pdf, ("pdf", PaperFormat::Pdf))];
-        let formats = formats.into_iter().filter(|(format, _)| has(*format)).map(|(_, paper)| paper).collect();
-        Ok(Prints { width: paper, formats })
-    }
-
     /// A picture in each format: extension and bytes; letters that could not be drawn are added to `missing`.
     pub(super) fn of(
         &self,

@@ -6,8 +6,8 @@ use std::{
 };
 
 use super::{
-    note,
-    paper::{PictureFormat, Prints},
+    flags, note,
+    paper::{PaperFlags, Prints},
     print,
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
         part_file::PartFile,
         reader::{self, Finished},
     },
-    paper::{Printer, told},
+    paper::{Printer, missing_letters},
     report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
@@ -30,7 +30,8 @@ Examples:
   curvelax plot ellipses --format png,pdf --width page --dpi 300
 
 Draws DIR/plots/*.svg and DIR/report.html from run.json, summary.csv, members.csv, levels.csv, mean_excess.csv and
-plots/portraits.json in DIR. The same version of the program writes the same bytes as the run.
+plots/portraits.json in DIR, or with --format plots/*.png and plots/*.pdf. The same version of the program writes the
+same bytes as the run.
 
 Pictures as png and pdf are for papers: white, as wide as a column, with text of 7 points and without title and
 sentences, which belong into the caption. The text of a pdf can be selected. Journals ask for columns of 84 to 90 mm and
@@ -43,23 +44,16 @@ pub struct PlotArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     run: PathBuf,
-    /// Formats: plots/*.svg with report.html for screens, plots/*.png and plots/*.pdf for papers
-    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', value_enum, default_value = "svg")]
-    format: Vec<PictureFormat>,
-    /// Width of png and pdf: column (85 mm), page (170 mm) or 80 to 300 mm [default: column]
-    #[arg(long, value_name = "WIDTH")]
-    width: Option<String>,
-    /// Dots per inch of png, 72 to 1200 [default: 600]
-    #[arg(long, value_name = "DPI", allow_negative_numbers = true)]
-    dpi: Option<i64>,
+    #[command(flatten)]
+    paper: PaperFlags,
     /// Folder for the pictures, which must not exist yet [default: that of the run]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = flags::OUTPUT)]
     out: Option<PathBuf>,
     /// Write into an existing --out DIR, replacing earlier pictures
-    #[arg(long)]
+    #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// Print no table: only errors
-    #[arg(long)]
+    #[arg(long, help_heading = flags::OUTPUT)]
     quiet: bool,
 }
 
@@ -94,8 +88,7 @@ impl Prints {
 
 /// Runs the command.
 pub fn plot(args: PlotArgs) -> Result<()> {
-    let prints = Prints::new(&args.format, args.width.as_deref(), args.dpi)?;
-    let on_screen = args.format.contains(&PictureFormat::Svg);
+    let (prints, on_screen) = (args.paper.prints()?, args.paper.on_screen());
     // Before the folder is opened, which would create a missing one.
     reader::provenance(&args.run)?;
     let (out, force, owner) = match &args.out {
@@ -122,7 +115,7 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     if args.quiet {
         return Ok(());
     }
-    told(&missing).iter().for_each(|told| note(&format!("note: {told}")));
+    missing_letters(&missing).iter().for_each(|missing_letters| note(&format!("note: {missing_letters}")));
     print(&format!("results    {}: {names}\n", out.display()))
 }
 

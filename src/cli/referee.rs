@@ -20,8 +20,8 @@ pub struct RefereeFlags {
     /// Instead, compare relaxation times with those of an independent spectral solver, for a smooth shape
     #[arg(long, conflicts_with_all = ["problem", "work_precision"], help_heading = REFEREE)]
     referee: bool,
-    /// Compare the limits of so many members of an ensemble, as `curvelax run --accurate` makes them, instead of one curve
-    /// at several n
+    /// Compare the limits of so many members of an ensemble, as `curvelax run --accurate` makes them, instead of one
+    /// curve at several n
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
     curves: Option<u64>,
     /// Only these members [default: all]
@@ -127,7 +127,8 @@ pub fn referee(spec: &Spec, one: bool, folder: Option<OutputFolder>, quiet: bool
     verdict(&rows, quiet)
 }
 
-/// Says how many limits are within their half-widths; members without a truth are an error, with the reason of the first.
+/// Says how many limits are within their half-widths; members without a truth are an error, with the reason of the
+/// first.
 fn verdict(rows: &[RefereeRow], quiet: bool) -> Result<()> {
     let bars: Vec<f64> = rows.iter().filter_map(RefereeRow::bars).map(f64::abs).collect();
     if !quiet && bars.len() > 1 {

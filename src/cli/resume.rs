@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::{flags::MACHINE, manner::MannerFlags, parsers};
+use super::{flags::MACHINE, parsers, report_flags::ReportFlags};
 use crate::{
     ensemble::request::spec::BackendChoice,
     error::Result,
@@ -38,13 +38,13 @@ pub struct ResumeArgs {
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
     threads: Option<usize>,
     #[command(flatten)]
-    manner: MannerFlags,
+    options: ReportFlags,
 }
 
 /// Runs the command.
 pub fn resume(args: ResumeArgs) -> Result<()> {
-    let ResumeArgs { run, backend, adapter, threads, manner } = args;
-    manner.check_name(&run)?;
+    let ResumeArgs { run, backend, adapter, threads, options } = args;
+    options.check_name(&run)?;
     let place = ResumePlace { backend, adapter, threads, why: None };
-    manner.ended(session::resume(&run, place, &manner)?, &run)
+    options.ended(session::resume(&run, place, &options)?, &run)
 }

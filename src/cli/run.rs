@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::{dry_run, flags, manner::MannerFlags, print};
+use super::{dry_run, flags, print, report_flags::ReportFlags};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
@@ -51,12 +51,12 @@ pub struct RunArgs {
     /// Write into an existing DIR, replacing the earlier run in it. A folder that holds anything else is refused
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// Resume the run in DIR if it was interrupted, leave it if it is finished, start it if there is none. The same line
-    /// then starts and restarts a job
+    /// Resume the run in DIR if it was interrupted, leave it if it is finished, start it if there is none. The same
+    /// line then starts and restarts a job
     #[arg(long, conflicts_with_all = ["force", "dry_run", "print_spec"], help_heading = flags::OUTPUT)]
     resume: bool,
     #[command(flatten)]
-    manner: MannerFlags,
+    options: ReportFlags,
     /// Predict memory, disk space, steps and time of the run from a pilot of some two seconds of work, and stop
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
@@ -67,22 +67,22 @@ pub struct RunArgs {
 
 /// Runs the command.
 pub fn run(args: RunArgs) -> Result<()> {
-    let RunArgs { spec, flags, out, force, resume, manner: host, dry_run, print_spec } = args;
+    let RunArgs { spec, flags, out, force, resume, options: host, dry_run, print_spec } = args;
     let request = request(spec, flags)?;
     let asked = request.backend;
     // Rounds and pilots take time, too.
-    let manner = if request.accuracy.is_some() || dry_run { Some(host.manner()?) } else { None };
+    let options = if request.accuracy.is_some() || dry_run { Some(host.options()?) } else { None };
     // A name that cannot be used is told before the rounds, which may take minutes.
     if let (false, Some(out)) = (print_spec || dry_run || resume, &out) {
         OutputFolder::check_place(out, force)?;
     }
-    let placed = PlacedStudy::of(RunPlan::new(request, manner.as_ref(), &host)?)?;
+    let placed = PlacedStudy::of(RunPlan::new(request, options.as_ref(), &host)?)?;
     if print_spec {
         return print(&placed.study.spec().to_toml()?);
     }
     placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
-    if let (true, Some(manner)) = (dry_run, &manner) {
-        return dry_run::dry_run(placed, &manner.stop, &host);
+    if let (true, Some(options)) = (dry_run, &options) {
+        return dry_run::dry_run(placed, &options.stop, &host);
     }
     let out = out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
     host.check_name(&out)?;
@@ -90,9 +90,9 @@ pub fn run(args: RunArgs) -> Result<()> {
     let completed = match begun {
         Some(begun) => session::resume_like(begun, &placed.study, asked, &host)?,
         None => {
-            let manner = manner.map_or_else(|| host.manner(), Ok)?;
+            let options = options.map_or_else(|| host.options(), Ok)?;
             let existing = if resume { Existing::Filled } else { force.into() };
-            Some(session::begin(placed, &out, existing, manner, &host)?)
+            Some(session::begin(placed, &out, existing, options, &host)?)
         }
     };
     host.ended(completed, &out)

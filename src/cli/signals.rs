@@ -30,18 +30,18 @@ const LAST_WORD: Duration = Duration::from_millis(100);
 /// # Errors
 /// [`Error::Failed`](crate::Error::Failed) if the system has no threads or no pipe for it.
 pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
-    let (mut ears, closing) = system::ears()?;
+    let (mut listener, closing) = system::listener()?;
     let (ask, asked) = channel();
     let (to_stop, at_end) = (stop.clone(), stop.clone());
     threads::start("clock", move || clock(&at_end, &asked, most, closing))?;
     threads::start("signals", move || {
-        ears.hear(|cause| {
+        listener.forward(|cause| {
             to_stop.ask(cause);
             // The clock is gone if the process is ending.
             let _ = ask.send(());
         });
         if let Some(error) = last_word(&to_stop) {
-            // The clock does not wait for the message, as nobody may read it.
+            // The clock does not wait for the message, as no one may read it.
             note(&format!("error: {error}"));
         }
     })?;
@@ -59,7 +59,7 @@ fn last_word(stop: &Stop) -> Option<crate::Error> {
 
 /// Waits until the run is `asked` to stop or `most` is over, and then for its end. When time is up, whatever is still
 /// running is ended: a checkpoint is on disk.
-fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, ears: system::Closing) {
+fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, listener: system::ListenerHandle) {
     match most.map_or_else(|| asked.recv().map_err(Into::into), |most| asked.recv_timeout(most)) {
         Ok(()) => {}
         Err(RecvTimeoutError::Timeout) => stop.ask(Cause::MaxTime),
@@ -71,7 +71,7 @@ fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, ears: system
         Err(RecvTimeoutError::Disconnected) => return,
     }
     if let Some(error) = last_word(stop) {
-        ears.close();
+        listener.close();
         thread::sleep(LAST_WORD);
         system::exit(error.exit_code());
     }
@@ -102,25 +102,25 @@ mod system {
     use crate::Error;
 
     /// Receives the signals.
-    pub struct Ears(Signals);
+    pub struct SignalListener(Signals);
     /// Ends the reception.
-    pub type Closing = Handle;
+    pub type ListenerHandle = Handle;
 
-    pub fn ears() -> Result<(Ears, Closing)> {
+    pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
         let ignored = ignored();
-        let heard = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-        let signals = Signals::new(heard).map_err(|e| {
+        let received = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+        let signals = Signals::new(received).map_err(|e| {
             Error::Failed(format!(
                 "cannot receive signals: {e}; raise the limit of open files (ulimit -n), or close some"
             ))
         })?;
         let closing = signals.handle();
-        Ok((Ears(signals), closing))
+        Ok((SignalListener(signals), closing))
     }
 
-    impl Ears {
+    impl SignalListener {
         /// Forwards signals that ask for the end, until closed.
-        pub fn hear(&mut self, mut ask: impl FnMut(Cause)) {
+        pub fn forward(&mut self, mut ask: impl FnMut(Cause)) {
             for signal in self.0.forever() {
                 ask(match signal {
                     SIGINT => Cause::Interrupt,
@@ -157,21 +157,21 @@ mod system {
 
     use super::*;
 
-    pub struct Ears(Receiver<()>);
-    pub struct Closing(Sender<()>);
+    pub struct SignalListener(Receiver<()>);
+    pub struct ListenerHandle(Sender<()>);
 
-    pub fn ears() -> Result<(Ears, Closing)> {
-        let (closing, ears) = channel();
-        Ok((Ears(ears), Closing(closing)))
+    pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
+        let (closing, listener) = channel();
+        Ok((SignalListener(listener), ListenerHandle(closing)))
     }
 
-    impl Ears {
-        pub fn hear(&mut self, _: impl FnMut(Cause)) {
+    impl SignalListener {
+        pub fn forward(&mut self, _: impl FnMut(Cause)) {
             let _ = self.0.recv();
         }
     }
 
-    impl Closing {
+    impl ListenerHandle {
         pub fn close(self) {
             let _ = self.0.send(());
         }

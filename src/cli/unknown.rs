@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flag_of_another_command_is_told_as_such() {
+    fn a_flag_of_another_command_is_named_as_such() {
         let program = Cli::command();
         let all: BTreeSet<&str> = program.get_subcommands().flat_map(flags).collect();
         let mut pairs = 0;

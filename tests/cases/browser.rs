@@ -137,7 +137,7 @@ fn a_broken_page_is_found_out(browser: &Path) {
     assert!(whole.console.is_empty() && whole.has_slider(), "{:?}", whole.console);
     // The policy refuses any script but the one it names; without the policy, the script fails.
     for text in [&text, &unguarded] {
-        let broken = spoiled(text, "\"use strict\";", "\"use strict\"; nobody();");
+        let broken = spoiled(text, "\"use strict\";", "\"use strict\"; undefined_function();");
         assert!(!broken.console.is_empty() && !broken.has_slider(), "{:?}", broken.console);
         assert_eq!(broken.paths("now"), broken.paths("start"));
     }

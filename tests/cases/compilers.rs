@@ -143,8 +143,8 @@ fn spirv_is_valid() {
         }
     }
     println!("{judged} kernels are valid");
-    // Two solvers, two forms, crystals, and forces with and without them, fixed and adaptive, two precisions; sweeps also within a
-    // subgroup, but for 257 nodes.
+    // Two solvers, two forms, crystals, and forces with and without them, fixed and adaptive, two precisions; sweeps
+    // also within a subgroup, but for 257 nodes.
     assert_eq!(judged, 3 * (20 + 20) + 2 * 20);
     // Negative control: a word of the code is changed.
     let path = folder.path().join("direct-f32-n100.spv");
@@ -174,7 +174,8 @@ fn nothing_is_spilled() {
     assert!(spilled.remove("control").is_some_and(|spilled| spilled > 0));
     // Mesa 22.3 fails on some in f64.
     assert_eq!(spilled.keys().filter(|name| name.contains("-f32-")).count(), 30, "{spilled:?}");
-    // In adaptive steps of crystals in f64, and in all steps of driven ones, more values are needed at once than there are registers.
+    // In adaptive steps of crystals in f64, and in all steps of driven ones, more values are needed at once than there
+    // are registers.
     let allowed = |name: &str| match name {
         "direct-adaptive-crystal-f64-n100" => 12,
         "gauss-seidel-adaptive-crystal-f64-n100" => 22,

@@ -1,8 +1,9 @@
-//! The program on adapters that open but fail: they compute wrongly, compile for ever, are lost or hang, or hold little.
+//! The program on adapters that open but fail: they compute wrongly, compile without end, are lost or hang, or hold
+//! little.
 //!
 //! Each is a real Vulkan driver, lavapipe or SwiftShader, behind `driver.c`, which passes all calls on but does
-//! one thing badly and calls itself hardware. The program is the one that users get: `--backend auto` must end on the CPU
-//! with one note, and `--backend gpu` with one error.
+//! one thing badly and calls itself hardware. The program is the one that users get: `--backend auto` must end on the
+//! CPU with one note, and `--backend gpu` with one error.
 //!
 //! Nothing depends on the speed of the machine. A driver is given up after the seconds that a test says, which are few
 //! only where it must be given up; and if a working one is given up on a slow machine, the test has more patience.
@@ -100,7 +101,7 @@ pub fn trials() -> Vec<Trial> {
             trials.push(trial.with_ignored_flag(left_out));
         };
         if driver == Driver::Lavapipe {
-            add("a kernel that compiles for ever is abandoned for the CPU", compiles_for_ever);
+            add("a kernel that compiles without end is abandoned for the CPU", compiles_without_end);
             add("a dispatch that hangs midway is abandoned for the CPU", hangs_midway);
         }
         add("without a fault the run is on the GPU and conforms", no_fault);
@@ -364,7 +365,7 @@ fn lost_midway(driver: Driver) -> Outcome {
     continued(driver, &run_in(gpu.home, driver, "nothing", "resume out --backend cpu").ended(0)?)
 }
 
-fn compiles_for_ever(driver: Driver) -> Outcome {
+fn compiles_without_end(driver: Driver) -> Outcome {
     // After 5 s it is told that the kernel is still being compiled.
     let auto = run_with(driver, "compiles", 6, "--backend auto").ended(0)?;
     auto.told("note: GPU Hostile is still compiling the kernel", &["after 6 s the CPU is used instead"])?;

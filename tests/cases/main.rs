@@ -1,5 +1,6 @@
-//! The tests whose cases are values: what there is to test depends on the adapters, drivers and compilers of the machine,
-//! and what is missing is reported as ignored. `cargo test --release --test cases -- MODULE:` runs those of one file.
+//! The tests whose cases are values: what there is to test depends on the adapters, drivers and compilers of the
+//! machine, and what is missing is reported as ignored. `cargo test --release --test cases -- MODULE:` runs those of
+//! one file.
 
 mod browser;
 #[path = "../common/mod.rs"]

@@ -12,7 +12,7 @@ use curvelax::{
         gpu::{Gpu, Kernel, Variant, kernel::Budget},
     },
     ensemble::{
-        Cell, Ended, Family, Paused, Sink, Spec, Standing, Wish,
+        Cell, Ended, Family, Paused, RunProgress, Sink, SinkRequest, Spec,
         request::spec::{FinalTime, Precision, Pull, Solver, Tau},
     },
     scheme::step::Method,
@@ -25,9 +25,9 @@ use libtest_mimic::{Failed, Trial};
 #[derive(Default)]
 struct Interrupting {
     ended: Vec<Ended>,
-    /// Calls of `wish` until the next stop.
+    /// Calls of `request` until the next stop.
     patience: u32,
-    standing: Standing,
+    progress: RunProgress,
     /// The members in progress at the last checkpoint that had them.
     resident: BTreeMap<u64, Paused>,
     /// Whether members in progress are lost at regular stops.
@@ -40,22 +40,22 @@ impl Sink for Interrupting {
         Ok(())
     }
 
-    fn wish(&mut self) -> Wish {
+    fn next_request(&mut self) -> SinkRequest {
         self.patience = self.patience.saturating_sub(1);
         match self.patience {
-            0 => Wish::Stop(Error::Stopped("enough".into())),
-            1 => Wish::Checkpoint,
-            _ => Wish::Continue,
+            0 => SinkRequest::Stop(Error::Stopped("enough".into())),
+            1 => SinkRequest::Checkpoint,
+            _ => SinkRequest::Continue,
         }
     }
 
-    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
-        assert_eq!(standing.next as usize, self.ended.len());
-        let Standing { next, early, resident } = standing;
+    fn checkpoint(&mut self, progress: &RunProgress) -> Result<()> {
+        assert_eq!(progress.next as usize, self.ended.len());
+        let RunProgress { next, early, resident } = progress;
         if let Some(resident) = resident {
             self.resident.clone_from(resident);
         }
-        self.standing = Standing { next: *next, early: early.clone(), resident: None };
+        self.progress = RunProgress { next: *next, early: early.clone(), resident: None };
         Ok(())
     }
 }
@@ -76,7 +76,7 @@ fn cells(name: &str, spec: &Spec) -> Result<[Cell; 1]> {
 
 fn straight(name: &str, spec: &Spec, precision: Precision, open: Open) -> Result<Vec<Ended>> {
     let mut all = Interrupting { patience: u32::MAX, ..Interrupting::default() };
-    resume(&cells(name, spec)?, precision, open(spec)?.as_mut(), 2, Standing::default(), &mut all)?;
+    resume(&cells(name, spec)?, precision, open(spec)?.as_mut(), 2, RunProgress::default(), &mut all)?;
     Ok(all.ended)
 }
 
@@ -88,15 +88,15 @@ fn in_pieces(name: &str, spec: &Spec, precision: Precision, open: Open, patience
         // More each time, so that the run ends although members in progress are lost.
         sink.patience = patience + piece / 4;
         sink.lost = piece % 5 == 0;
-        let mut standing = std::mem::take(&mut sink.standing);
+        let mut progress = std::mem::take(&mut sink.progress);
         let resident = std::mem::take(&mut sink.resident);
         if !sink.lost {
-            standing.resident = Some(resident);
+            progress.resident = Some(resident);
         }
         // As read back from disk.
-        let bytes = postcard::to_allocvec(&standing).expect("a state");
-        let standing = postcard::from_bytes(&bytes).expect("the same");
-        match resume(&cells, precision, open(spec)?.as_mut(), 2, standing, &mut sink) {
+        let bytes = postcard::to_allocvec(&progress).expect("a state");
+        let progress = postcard::from_bytes(&bytes).expect("the same");
+        match resume(&cells, precision, open(spec)?.as_mut(), 2, progress, &mut sink) {
             Err(Error::Stopped(_)) => {}
             done => return done.map(|()| (sink.ended, piece)),
         }

@@ -120,8 +120,8 @@ fn reference() -> Spec {
     Spec { backend, precision, solver: Solver::Direct.into(), ..Spec::default() }
 }
 
-/// Compares the errors in time, those against the tightest tolerance, with the tolerances, of which they may be so many; counts
-/// those above a hundredth of it.
+/// Compares the errors in time, those against the tightest tolerance, with the tolerances, of which they may be so
+/// many; counts those above a hundredth of it.
 fn within_tolerance(rows: &[ConvergenceRow], most: f64, above_a_hundredth: &mut usize) -> Outcome {
     let errors: Vec<f64> = rows.iter().filter_map(|row| row.error).collect();
     for (row, error) in rows.iter().zip(&errors).take(rows.len() - 1) {
@@ -152,8 +152,8 @@ fn orders() -> Outcome {
             // Errors of steps of several orders cancel now and then, which leaves no order to be seen: what counts is
             // that the error in time is below the tolerance.
             if study.varied == Varied::Tolerance {
-                // Decays of small modes in the geometric form are off by five tolerances, and by eleven where the position
-                // equation damps what the flow itself does not.
+                // Decays of small modes in the geometric form are off by five tolerances, and by eleven where the
+                // position equation damps what the flow itself does not.
                 let most = match problem.beside {
                     Beside::Nothing => 0.7,
                     Beside::Conserved(_) => 14.0,

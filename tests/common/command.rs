@@ -60,7 +60,7 @@ pub fn script(shell: &str, home: &Path, script: &str) -> Command {
 
 /// The program with the usual response to a signal such as `HUP`, even if it is ignored where the tests run, as under
 /// nohup or in the background of a shell. `None` if `env` cannot do that.
-pub fn hearing(home: &Path, signal: &str) -> Option<Command> {
+pub fn handling(home: &Path, signal: &str) -> Option<Command> {
     let option = format!("--default-signal={signal}");
     let mut probe = Command::new("env");
     let resets = probe.args([&option, "true"]).stderr(Stdio::null()).status().is_ok_and(|status| status.success());
@@ -114,9 +114,9 @@ pub fn signal(child: &mut Child, name: &str) {
     }
 }
 
-/// Starts the command and sends it a signal as soon as `is_time`, which is asked again and again with what is on stderr.
-/// There is no time limit: only the end of the program ends the wait, so that no machine is too slow or, for a run that is
-/// long enough, too fast.
+/// Starts the command and sends it a signal as soon as `is_time`, which is asked again and again with what is on
+/// stderr. There is no time limit: only the end of the program ends the wait, so that no machine is too slow or, for a
+/// run that is long enough, too fast.
 pub fn signalled_when(command: &mut Command, name: &str, mut is_time: impl FnMut(&str) -> bool) -> Output {
     // Files can be read while the program runs, and do not block it when they are full.
     let [out, err] = [(); 2].map(|()| NamedTempFile::new().unwrap());
@@ -150,8 +150,8 @@ pub fn stopped_after(home: &Path, arguments: &str, words: &str) -> Output {
     signalled_when(&mut command(home, arguments), "TERM", |said| said.contains(words))
 }
 
-/// Leaves in the folder `out` of `home` a run that was stopped as soon as it could be resumed. A run that was over before
-/// is begun again.
+/// Leaves in the folder `out` of `home` a run that was stopped as soon as it could be resumed. A run that was over
+/// before is begun again.
 #[track_caller]
 pub fn stopped_run(home: &Path, arguments: &str, out: &str) -> Output {
     let state = home.join(out).join(".curvelax.state");

@@ -18,8 +18,8 @@ pub struct Done {
 /// A row by column name.
 pub type Row = HashMap<String, String>;
 
-/// Runs `curvelax run ARGUMENTS --backend cpu`; `files` are in the folder where it runs. It must succeed, or say that every
-/// member failed if that is so.
+/// Runs `curvelax run ARGUMENTS --backend cpu`; `files` are in the folder where it runs. It must succeed, or say that
+/// every member failed if that is so.
 #[track_caller]
 pub fn run_with(files: &[(&str, &str)], arguments: &str) -> Done {
     let home = TempDir::new().unwrap();

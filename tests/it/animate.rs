@@ -117,7 +117,7 @@ fn a_gif_shows_all_members_from_start_to_end() {
 
 #[test]
 fn movie_and_report_tell_the_limit_and_that_their_clock_is_raw() {
-    let raw = "t is raw, at the nodes of the run";
+    let raw = "t is that of the run, not the limit";
     let of = |more: &str| {
         let done = run(&format!("--curves 2 --points 64 --accurate --units um,h --mobility 2 {more}"));
         animated(done.home.path(), &format!("out {SECOND} --out movie.svg"));

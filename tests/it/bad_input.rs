@@ -170,7 +170,7 @@ fn a_wrong_sweep_names_its_key_and_cell() {
 }
 
 #[test]
-fn a_spec_file_is_told_what_is_wanted_without_types_of_rust() {
+fn an_error_in_a_spec_file_names_no_types_of_rust() {
     for (text, parts) in [
         ("curves = 'x'", &["expected a whole number from 0, found the text \"x\""][..]),
         ("curves = '8'", &["found the text \"8\"; leave the quotes out"]),
@@ -198,7 +198,7 @@ fn a_spec_file_is_told_what_is_wanted_without_types_of_rust() {
 }
 
 #[test]
-fn a_file_of_outlines_that_is_not_there_is_told_with_the_path_looked_for() {
+fn a_missing_file_of_outlines_is_named_with_its_full_path() {
     let home = TempDir::new().unwrap();
     fs::create_dir(home.path().join("folder.csv")).unwrap();
     fs::write(home.path().join("file.csv"), "0,0\n1,0\n1,1\n").unwrap();
@@ -326,7 +326,7 @@ fn an_overlong_value_is_echoed_by_its_beginning() {
 }
 
 #[test]
-fn a_wrong_value_of_a_sweep_is_told_once() {
+fn a_wrong_value_of_a_sweep_is_reported_once() {
     let message = refused(&["--sweep", "amplitude=0.02,abc"], &[]);
     assert_says(&message, &["error: --sweep amplitude=abc: expected a number, or a distribution"]);
     assert_eq!(message.matches("abc").count(), 1, "{message}");

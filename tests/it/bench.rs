@@ -70,7 +70,7 @@ fn adaptive_steps_are_measured_with_solvers_that_profit_from_them() {
 }
 
 #[test]
-fn a_case_that_cannot_run_has_its_reason_in_its_row_and_the_others_go_on() {
+fn a_case_that_cannot_run_has_its_reason_in_its_row_and_the_others_continue() {
     let rows = rows("--backend cpu --solver direct --precision f32 --points 400,32");
     let reason = rows[0]["failed"].as_str().expect("a reason");
     assert!(reason.contains("verified against f64 up to"), "{reason}");

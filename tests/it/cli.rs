@@ -8,7 +8,7 @@ use std::{
 };
 
 use crate::common::{
-    command::{command, curvelax, hearing, program, signal, signalled_when, stopped_when},
+    command::{command, curvelax, handling, program, signal, signalled_when, stopped_when},
     program::{number, run},
 };
 use curvelax::backend::gpu::Gpu;
@@ -239,7 +239,7 @@ fn bytes(folder: &Path) -> f64 {
 }
 
 #[test]
-fn the_disk_space_of_a_run_is_foretold_within_a_quarter() {
+fn the_disk_space_of_a_run_is_estimated_within_a_quarter() {
     let home = TempDir::new().unwrap();
     let mut foretold = Vec::new();
     for (i, flags) in [
@@ -306,7 +306,7 @@ const NEVER: &str = "100000h";
 
 #[cfg(target_os = "linux")]
 #[test]
-fn the_memory_of_a_run_is_foretold_within_a_fifth() {
+fn the_memory_of_a_run_is_estimated_within_a_fifth() {
     let home = TempDir::new().unwrap();
     let mut foretold = Vec::new();
     // Few members, and so many small ones that the data stored for each dominate; members with a rate need more.
@@ -329,8 +329,8 @@ fn the_memory_of_a_run_is_foretold_within_a_fifth() {
     let snapshots = (0..400).map(|i| (f64::from(i) * 2.5e-5).to_string()).collect::<Vec<_>>().join(",");
     let runs = runs.map(|spec| spec.replace("SNAPSHOTS", &snapshots));
     for (rank, spec) in runs.iter().enumerate() {
-        // Whether a run saves a checkpoint, which takes memory, must not depend on how fast it is, and its pool not on the
-        // number of cores.
+        // Whether a run saves a checkpoint, which takes memory, must not depend on how fast it is, and its pool not on
+        // the number of cores.
         let base = format!("run --backend cpu --threads 1 {spec} --checkpoint-every {NEVER} --quiet");
         let said = json(home.path(), &format!("{base} --dry-run --json"))["memory_bytes"].as_f64().unwrap();
         let taken = peak(home.path(), &base, &rank.to_string());
@@ -415,7 +415,7 @@ fn the_pilot_of_a_dry_run_can_be_stopped() {
     };
     stopped(&curvelax(home.path(), &format!("{long} --max-time 1s")), "--max-time", 75);
     for (signal, cause, code) in [("TERM", "SIGTERM", 75), ("INT", "Ctrl-C", 130)] {
-        let Some(mut command) = hearing(home.path(), signal) else { continue };
+        let Some(mut command) = handling(home.path(), signal) else { continue };
         command.args(long.split_whitespace());
         stopped(&signalled_when(&mut command, signal, |said| said.contains("warning: ")), cause, code);
     }

@@ -1,7 +1,8 @@
-//! Whether `t_limit ± t_error` holds the true limit: of ensembles that were not used to find the rule, against the referee.
+//! Whether `t_limit ± t_error` holds the true limit: of ensembles that were not used to find the rule, against the
+//! referee.
 //!
-//! `CURVELAX_FAMILIES=SEED,MEMBERS tests/run --test it -- coverage --nocapture` draws other families, with so many members
-//! each, and prints a line for each of them.
+//! `CURVELAX_FAMILIES=SEED,MEMBERS tests/run --test it -- coverage --nocapture` draws other families, with so many
+//! members each, and prints a line for each of them.
 
 use std::env;
 
@@ -91,7 +92,8 @@ impl Coverage {
         self.bars.iter().filter(|bars| **bars <= share).count()
     }
 
-    /// Whether all but one in ten are, or all but one: of one family fewer than 95 % are (`docs/internals/method.md#limit`).
+    /// Whether all but one in ten are, or all but one: of one family fewer than 95 % are
+    /// (`docs/internals/method.md#limit`).
     fn holds(&self, share: f64) -> bool {
         self.bars.len() - self.within(share) <= (self.bars.len() / 10).max(1)
     }

@@ -1,5 +1,5 @@
-//! Crystals from outside, against numbers of an independent spectral program (128 to 256 directions): a 2:1 ellipse under
-//! four surface energies, the Wulff shape, and the decay of its perturbations.
+//! Crystals from outside, against numbers of an independent spectral program (128 to 256 directions): a 2:1 ellipse
+//! under four surface energies, the Wulff shape, and the decay of its perturbations.
 
 use std::f64::consts::{PI, TAU};
 

@@ -326,7 +326,8 @@ fn the_readme_has_at_most_a_thousand_words() {
     );
 }
 
-/// The commands of a page that run something, each with what it is said to print, but for what differs between machines.
+/// The commands of a page that run something, each with what it is said to print, but for what differs between
+/// machines.
 fn printed(page: &str) -> Vec<(&str, Vec<&str>)> {
     let mut runs: Vec<(&str, Vec<&str>)> = Vec::new();
     for line in page.lines().filter_map(|line| line.strip_prefix("    ")) {

@@ -90,7 +90,7 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     let row = &done.summary()[0];
     let (t, circle) = (number(row, "t_vanish"), f64::sqrt(2.0) / 0.5);
     assert!(t < circle && t > 0.9 * circle, "{t} {circle}");
-    // It relaxed on its way.
+    // It relaxed before that.
     assert!((0.5..2.0).contains(&number(row, "t_relax")));
     let small = number(&done.rows("events.csv")[0], "t");
     assert!(small < number(row, "t_end"), "{small}");

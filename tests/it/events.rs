@@ -99,8 +99,8 @@ struct Turn {
     to: f64,
 }
 
-/// A level just short of each turning point of the series of a member that is farther than all before, by `depth` of the
-/// whole way of the observable.
+/// A level just short of each turning point of the series of a member that is farther than all before, by `depth` of
+/// the whole way of the observable.
 fn turns(member: usize, rows: &[Row], depth: f64) -> Vec<Turn> {
     let mut turns = Vec::new();
     for name in ["length", "excess", "energy", "k_min", "k_max", "mesh_ratio"] {
@@ -175,7 +175,8 @@ fn a_member_relaxes_where_its_excess_dips_below_the_threshold() {
 #[test]
 fn an_event_does_not_depend_on_what_else_is_watched() {
     let members = "--shape nonconvex --pull auto --curves 4 --points 48 --adaptive=1e-3 --t-end 0.02";
-    // The largest curvature of a member turns round twice within a step, beyond the first level and short of the second.
+    // The largest curvature of a member turns round twice within a step, beyond the first level and short of the
+    // second.
     let level = "--event level=k_max<=4.96";
     let of_level = |events: &str| -> Vec<Row> {
         let rows = run(&format!("{members} {events}")).rows("events.csv");
@@ -215,7 +216,7 @@ fn single_precision_finds_the_events_of_double_precision() {
 }
 
 #[test]
-fn what_holds_from_the_start_is_told_and_what_does_not_happen_is_censored_at_the_end() {
+fn an_event_at_the_start_is_warned_of_and_one_that_does_not_happen_is_censored() {
     let home = TempDir::new().unwrap();
     let mut command = program(home.path());
     command.args(["run", "--backend", "cpu", "--curves", "5", "--points", "48", "--adaptive=1e-3", "--t-end", "0.3"]);
@@ -326,8 +327,8 @@ fn events_have_a_limit_for_each_member_with_refine() {
     for (row, member) in rows.iter().filter(|row| row["event"] == "half").zip(&summary) {
         let (t, limit, error) = (number(row, "t"), number(row, "t_limit"), number(row, "t_error"));
         assert!(limit != t && (limit / t - 1.0).abs() < 0.05 && error > 0.0 && error < 0.1 * t, "{row:?}");
-        // Half the excess is one event: t_half by another name, at the nodes of the run. Inside a step, each is found by its
-        // own interpolation.
+        // Half the excess is one event: t_half by another name, at the nodes of the run. Inside a step, each is found
+        // by its own interpolation.
         assert!((t / number(member, "t_half") - 1.0).abs() < 1e-5, "{row:?} {member:?}");
     }
     assert!(rows.iter().filter(|row| row["event"] == "late").all(|row| row["t_limit"].is_empty()));

@@ -10,7 +10,7 @@ use std::{
 use curvelax::{
     ensemble::Spec,
     files::{Existing, state::checkpoint},
-    report::{Cause, Form, Manner, Progress, Stop},
+    report::{Cause, Progress, ReportOptions, ResultFormat, Stop},
     session::{Host, PlacedStudy, ResumePlace, RunPlan, begin, resume},
 };
 use tempfile::TempDir;
@@ -104,7 +104,7 @@ fn only_rough_members_get_more_nodes_and_their_limit_rests_on_them() {
         assert!(number::<f64>(row, "t_error") < 1e-2 * number::<f64>(row, "t_limit"), "{row:?}");
         most = most.max(points);
     }
-    assert!(told.contains(&format!("{count} of 12 members at up to n = {most}")), "{told}");
+    assert!(told.contains(&format!("{count} of 12 members needed more nodes, up to n = {most}")), "{told}");
     // Those of the events are at the same levels.
     assert_eq!(levels, self::levels(&out.join("event_levels.csv")));
     // Without --refine there is nothing finer than the member.
@@ -162,15 +162,15 @@ struct Patient(Option<u64>);
 impl Host for Patient {
     fn say(&self, _: &str) {}
 
-    fn form(&self) -> Form {
-        Form::Json
+    fn form(&self) -> ResultFormat {
+        ResultFormat::Json
     }
 
-    fn manner(&self) -> curvelax::Result<Manner> {
-        Ok(self.manner_with(Stop::default()))
+    fn options(&self) -> curvelax::Result<ReportOptions> {
+        Ok(self.options_with(Stop::default()))
     }
 
-    fn manner_with(&self, stop: Stop) -> Manner {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (enough, asked) = (self.0, stop.clone());
         let tell = move |done: u64, total: u64, share: f64| {
             assert!(done <= total && share <= 1.0, "{done} of {total}, {share}");
@@ -178,8 +178,8 @@ impl Host for Patient {
                 asked.ask(Cause::Terminate);
             }
         };
-        let progress = Progress::Told(Box::new(tell));
-        Manner { since: Instant::now(), progress, every: Duration::ZERO, stop, patience: Duration::MAX }
+        let progress = Progress::Callback(Box::new(tell));
+        ReportOptions { since: Instant::now(), progress, every: Duration::ZERO, stop, patience: Duration::MAX }
     }
 }
 
@@ -189,10 +189,10 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
     let text = "shape = 'ellipse:choice(1.3,4),1'\namplitude = 0.02\nmodes = '2..=5'\npoints = 64\nadaptive = 1e-3\n\
                 pull = 'auto'\nt-end = 'auto'\nrefine = true\nbackend = 'cpu'\nthreads = 1\nevent = ['half = excess <= 0.5 * start']";
     let spec = Spec { curves: 60, ..Spec::from_toml(text).unwrap() };
-    let manner = |host: &Patient| host.manner().unwrap();
+    let options = |host: &Patient| host.options().unwrap();
     let run = |out: &str, host: Patient| {
         let placed = RunPlan::new(spec.clone(), None, &host).and_then(PlacedStudy::of).unwrap();
-        begin(placed, &home.path().join(out), Existing::Refused, manner(&host), &host)
+        begin(placed, &home.path().join(out), Existing::Refused, options(&host), &host)
     };
     run("whole", Patient(None)).unwrap();
     let whole = levels(&home.path().join("whole/levels.csv"));

@@ -26,7 +26,7 @@ fn limited(home: &Path, limit: &str, arguments: &str) -> Output {
 /// 400 members exceed the buffer of a table, first of that with the longest rows, so that a write fails during the run;
 /// 50 do not, and it fails at the end.
 #[test]
-fn a_run_on_a_full_disk_goes_on_when_there_is_room() {
+fn a_run_on_a_full_disk_continues_when_there_is_room() {
     for (curves, first) in [(400, "members.csv"), (50, "summary.csv")] {
         let home = TempDir::new().unwrap();
         let output = curvelax(home.path(), "4", &format!("--curves {curves} --out out"));

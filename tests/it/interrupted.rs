@@ -181,12 +181,12 @@ mod unix {
     };
 
     use super::*;
-    use crate::common::command::{hearing, signal};
+    use crate::common::command::{handling, signal};
 
     /// A run that is resumed to its end.
     const SHORT: &str = "--curves 3 --points 34 --tau 2.5e-6 --t-end 1 --solver direct --series 0.1";
 
-    /// Leaves in `home` a run that was stopped on its way.
+    /// Leaves in `home` a run that was stopped in progress.
     fn stopped(home: &Path) {
         stopped_run(home, &format!("run --backend cpu {SHORT}"), "out");
     }
@@ -204,15 +204,15 @@ mod unix {
     }
 
     #[test]
-    fn a_run_goes_on_where_it_began_unless_it_is_told_to_go_elsewhere() {
+    fn a_run_continues_on_its_back_end_unless_another_is_requested() {
         let home = TempDir::new().unwrap();
         stopped(home.path());
         // As if it had begun on another machine: the platform is in the checkpoint, which has a checksum.
         let state = home.path().join("out/.curvelax.state");
-        let (mut head, standing) = curvelax::files::state::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
+        let (mut head, progress) = curvelax::files::state::checkpoint::from_bytes(&fs::read(&state).unwrap()).unwrap();
         head.origin.platform.driver = Some("another".into());
-        let resident = standing.resident.clone().unwrap();
-        fs::write(&state, curvelax::files::state::checkpoint::to_bytes(&head, &standing, &resident).unwrap()).unwrap();
+        let resident = progress.resident.clone().unwrap();
+        fs::write(&state, curvelax::files::state::checkpoint::to_bytes(&head, &progress, &resident).unwrap()).unwrap();
         let words = ["the run began on cpu another", "continue on cpu", "add --backend cpu"];
         refused(home.path(), "out", "", &words);
         let message = said(&curvelax(home.path(), "resume out --backend cpu"), 0);
@@ -273,9 +273,9 @@ mod unix {
         let message = stopped_by(ignoring, &home.path().join("out"), &["HUP", "TERM"]);
         assert!(message.contains("stopped by SIGTERM"), "{message}");
         // If these tests run under nohup, it would be ignored here too.
-        let Some(mut heard) = hearing(home.path(), "HUP") else { return };
-        heard.args(format!("run --backend cpu {LONG} --out heard").split_whitespace());
-        let message = stopped_by(heard, &home.path().join("heard"), &["HUP"]);
+        let Some(mut handled) = handling(home.path(), "HUP") else { return };
+        handled.args(format!("run --backend cpu {LONG} --out handled").split_whitespace());
+        let message = stopped_by(handled, &home.path().join("handled"), &["HUP"]);
         assert!(message.contains("stopped by SIGHUP"), "{message}");
     }
 

@@ -53,8 +53,8 @@ fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) ->
     (ended.outcome, ended.portrait.unwrap().after)
 }
 
-/// A curve without any symmetry, about as large as the unit circle. Its sines are not those of the system, so that it has
-/// the same bits on every machine.
+/// A curve without any symmetry, about as large as the unit circle. Its sines are not those of the system, so that it
+/// has the same bits on every machine.
 fn potato(u: f64) -> DVec2 {
     let theta = TAU * u;
     let wave = |m: f64, a: f64, phase: f64| a * libm::cos(m * theta + phase);

@@ -1,5 +1,5 @@
-//! The tests that need nothing of their own process: one program, so that the library is linked once. A file is a module,
-//! and `cargo test --release --test it MODULE::` runs its tests.
+//! The tests that need nothing of their own process: one program, so that the library is linked once. A file is a
+//! module, and `cargo test --release --test it MODULE::` runs its tests.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -50,3 +50,4 @@ mod study;
 mod twins;
 mod vectors;
 mod vesicles;
+mod vocabulary;

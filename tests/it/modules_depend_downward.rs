@@ -1,6 +1,6 @@
-//! Modules depend downward only: Cargo keeps the order of the crates, this test that of the modules inside. No folder or
-//! file uses one above it in [`LAYERS`], and no files form a circle of uses. Tests inside the files may use anything. Type
-//! names are unique across the crates.
+//! Modules depend downward only: Cargo keeps the order of the crates, this test that of the modules inside. No folder
+//! or file uses one above it in [`LAYERS`], and no files form a circle of uses. Tests inside the files may use
+//! anything. Type names are unique across the crates.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

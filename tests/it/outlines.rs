@@ -168,7 +168,7 @@ fn groups_are_the_ensembles_of_their_members() {
 }
 
 #[test]
-fn copies_of_an_outline_are_no_independent_draws_and_cells_with_the_same_outlines_are_pairs() {
+fn copies_of_an_outline_are_paired_between_cells_not_compared_as_independent_draws() {
     let home = home();
     let home = home.path();
     let grouped = format!("run --shape file:grains.geojson --group-by phase {RUN} --out");
@@ -383,7 +383,7 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
     };
     let told = line("");
     assert!(
-        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 rounded, which changed the area by"),
+        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 were rounded, which changed the area by"),
         "{told}"
     );
     assert_eq!(line("--interpolate polygon --rounding 0"), "2 as a polygon");

@@ -15,7 +15,7 @@ const HANGS: std::time::Duration = std::time::Duration::from_secs(6 * 3600);
 /// of processor time.
 ///
 /// A program that exceeds a limit ends in another way: allocations fail, or a signal comes. One that waits for a pipe
-/// would wait for ever.
+/// would never return.
 #[track_caller]
 fn refused_at_once(folder: &Path, arguments: &[&str], start: &str) {
     let limits = "ulimit -v 300000 && ulimit -t 60 && exec \"$0\" \"$@\"";
@@ -40,7 +40,7 @@ fn pipe(path: &Path) {
 }
 
 #[test]
-fn a_spec_without_end_is_refused_at_once() {
+fn an_overlong_spec_is_refused_at_once() {
     let home = TempDir::new().unwrap();
     let in_home = |name: &str| home.path().join(name);
     endless(&in_home("huge.toml"), 3 << 30);
@@ -101,7 +101,7 @@ fn a_spec_without_end_is_refused_at_once() {
 }
 
 #[test]
-fn an_outline_without_end_is_refused_at_once() {
+fn an_overlong_outline_is_refused_at_once() {
     let home = TempDir::new().unwrap();
     let in_home = |name: &str| home.path().join(name);
     endless(&in_home("huge.csv"), 3 << 30);
@@ -126,7 +126,7 @@ fn an_outline_without_end_is_refused_at_once() {
 }
 
 #[test]
-fn files_of_a_run_without_end_are_refused_at_once() {
+fn overlong_files_of_a_run_are_refused_at_once() {
     let home = TempDir::new().unwrap();
     let arguments = ["--curves", "2", "--t-end", "0.01", "--points", "40", "--backend", "cpu", "--quiet"];
     let run = curvelax(home.path(), &[&["run", "--out", "run"], &arguments[..]].concat());

@@ -81,7 +81,7 @@ fn the_next_run_in_the_folder_removes_the_prints_of_the_last() {
 }
 
 #[test]
-fn names_in_letters_that_the_font_lacks_are_told() {
+fn names_in_letters_that_the_font_lacks_are_noted() {
     for (name, is_told) in [("長", true), ("čáß", false)] {
         let home = tempfile::tempdir().unwrap();
         for name in [name, "other"] {

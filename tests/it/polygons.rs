@@ -73,7 +73,7 @@ fn clearance(outline: &[DVec2], n: usize) -> f64 {
 }
 
 #[test]
-fn an_outline_that_n_nodes_resolve_becomes_simple_nodes_without_sharp_turns_and_any_other_is_reported() {
+fn outlines_that_n_nodes_resolve_become_simple_polygons_and_others_are_reported() {
     for n in [64, 100, 128, 200, 256] {
         let [mut resolved, mut crossed, mut sharp, mut touched] = [0; 4];
         for j in 0..300 {

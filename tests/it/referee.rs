@@ -96,7 +96,7 @@ fn small_modes_decay_as_linear_theory_says() {
 }
 
 #[test]
-fn the_time_does_not_depend_on_the_parameter_or_the_place_and_goes_with_the_fourth_power_of_the_size() {
+fn the_time_depends_on_the_size_alone_by_its_fourth_power() {
     let flow = Flow::SurfaceDiffusion;
     let nonconvex = curve("nonconvex");
     let time = |point: &dyn Fn(f64) -> DVec2| relaxation(&Referee::new(point, &flow).unwrap());

@@ -67,8 +67,8 @@ fn bars_hold_the_limit_and_are_not_idle() {
         let limit: fn(&Ended) -> f64 = |member| member.outcome.t_limit.unwrap();
         let own: fn(&Ended) -> f64 = |member| member.outcome.t_relax.unwrap();
         assert!(held(1.0, limit) >= 38, "{text}: {} of 40", held(1.0, limit));
-        // The controls: bars of a thirtieth do not hold, and times without a limit are outside. The nonconvex curve runs at
-        // up to 800 nodes, of which the errors are those of the truth; its bars are short in themselves.
+        // The controls: bars of a thirtieth do not hold, and times without a limit are outside. The nonconvex curve
+        // runs at up to 800 nodes, of which the errors are those of the truth; its bars are short in themselves.
         let is_idle = match text.contains("nonconvex") {
             true => members.iter().any(|member| member.outcome.t_error.unwrap() > 1e-3 * limit(member)),
             false => held(1.0 / 30.0, limit) >= 38,
@@ -230,8 +230,8 @@ fn members_are_as_many_as_sampling_needs() {
         let (reached, members) =
             (uncertainty(&ensemble("chosen")), field(&ensemble("chosen"), "members").parse::<f64>().unwrap());
         assert!(members > 64.0 && reached <= goal, "{members}: {reached}");
-        // With 1.5 times fewer the goal is missed. The ends of an interval are single members: of 205, 210 and 247 members
-        // of seed 5 it is 0.0048, 0.0040 and 0.0040, so no smaller factor holds for each seed.
+        // With 1.5 times fewer the goal is missed. The ends of an interval are single members: of 205, 210 and 247
+        // members of seed 5 it is 0.0048, 0.0040 and 0.0040, so no smaller factor holds for each seed.
         let fewer = (members / 1.5) as u64;
         assert_eq!(curvelax(home.path(), &format!("{run} --curves {fewer} --out fewer")).0, Some(0));
         assert!(uncertainty(&ensemble("fewer")) > goal, "seed {seed}: {fewer} of {members}");
@@ -239,7 +239,7 @@ fn members_are_as_many_as_sampling_needs() {
 }
 
 #[test]
-fn a_run_whose_error_cannot_be_told_says_why() {
+fn a_run_whose_error_is_not_known_says_why() {
     let home = TempDir::new().unwrap();
     let flags = "run --points 16 --modes 2..=4 --curves 2 --tau 0.01 --backend cpu --out out";
     let output = command::curvelax(home.path(), flags);

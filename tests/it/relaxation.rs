@@ -199,8 +199,8 @@ fn a_nonconvex_curve_relaxes_when_it_should_with_the_pull_and_not_without() {
     }
 }
 
-/// Times until the excess is 0.01, by an independent program with a fixed pull, at n = 128 and 256: of outlines that had
-/// lost area when their corners were rounded off.
+/// Times until the excess is 0.01, by an independent program with a fixed pull, at n = 128 and 256: of outlines that
+/// had lost area when their corners were rounded off.
 const ISLANDS: [(&str, [f64; 2]); 4] = [
     ("madagascar", [0.1837, 0.1836]),
     ("jamaica", [0.1966, 0.1965]),
@@ -413,7 +413,7 @@ fn a_crossing_is_seen_when_dense_snapshots_see_it_and_nowhere_else() {
             crossed += usize::from(first.is_some());
             if first.is_some() && outcome.status == Status::Relaxed {
                 relaxed += 1;
-                assert!(outcome.t_end > until, "curve {j} does not go on");
+                assert!(outcome.t_end > until, "curve {j} does not continue");
             }
         }
     }
@@ -572,7 +572,7 @@ fn extrapolated_steps_have_their_orders() {
             let [a, b, c] = [1, 2, 4].map(|times| of(times * steps));
             let found = ((a - b) / (b - c)).abs().log2();
             println!("{name}: order {order}: {found:.3}, differences {:.1e} {:.1e}", a - b, b - c);
-            // Some errors fall faster. On an ellipse stiff modes, which the redistribution stirs, reduce orders above 2.
+            // Some errors fall faster. On an ellipse stiff modes, stirred by redistribution, reduce orders above 2.
             let stirred = name.contains("ellipse");
             let least = if stirred { 1.7 } else { f64::from(order) - 0.8 };
             assert!((stirred && order > 3) || found > least, "{name}: order {found} instead of {order}");

@@ -48,7 +48,7 @@ fn none_of(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number_that_is_none() {
+fn pages_of_very_small_runs_have_no_nan() {
     let none_relaxed = "no member relaxed before its final time";
     for (arguments, said) in [
         ("--curves 1 --points 40 --adaptive=1e-3", "<strong>1</strong> of 1 member relaxed"),
@@ -58,7 +58,7 @@ fn runs_of_one_member_of_none_in_a_cell_and_of_none_that_relaxed_leave_no_number
         ("--curves 2 --points 40 --shape circle:1 --amplitude 0 --stop-when-relaxed", "All 2 members relaxed."),
         (
             "--curves 4 --points 32 --tau 0.05 --amplitude 0.4 --t-end 0.5 --solver direct --series 0.1",
-            "failed (see `status`)",
+            "failed (see <code>status</code>)",
         ),
     ] {
         let done = run(arguments);
@@ -102,7 +102,7 @@ fn a_study_compares_its_cells() {
         let median = times.get(3).map_or(String::new(), f64::to_string);
         assert_eq!(row["t_relax_median"].parse::<f64>().ok(), median.parse().ok(), "cell {cell}");
     }
-    assert!(done.text("report.html").contains("over 4 cells"));
+    assert!(done.text("report.html").contains("over 2 of 4 cells; the others have no median"));
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn cells_of_one_member_are_listed_by_what_varies() {
 }
 
 #[test]
-fn cells_are_told_apart_by_what_varies_in_one_legend() {
+fn one_legend_names_what_varies_between_cells() {
     let done = run(&format!("{RUN} --sweep amplitude=0.02,0.1 --sweep flow=surface-diffusion,willmore"));
     let page = done.text("report.html");
     let legend = page.split("<ul class=\"legend\"").nth(1).unwrap().split("</ul>").next().unwrap();
@@ -242,7 +242,7 @@ fn units_are_everywhere_and_micrometres_are_written_with_their_sign() {
     assert!(!page.replace(spec, "").contains(" um") && !page.contains("length⁴"), "um is for keyboards");
     assert!(curves.contains(" µm</text>") && curves.contains(" h</text>"), "{curves}");
     let plain = run("--curves 7 --points 40 --adaptive=1e-3 --t-end 1").text("report.html");
-    assert!(plain.contains("Times are in length⁴, the length being that of the coordinates."));
+    assert!(plain.contains("Times are in length⁴, in the unit of length of the coordinates."));
     let unnamed = run(&units.replace(" --units um,h", "")).text("report.html");
     assert!(unnamed.contains("t_relax (time of B)") && !unnamed.contains("length⁴"));
 }
@@ -257,13 +257,16 @@ fn long_tables_are_folded() {
 }
 
 #[test]
-fn the_page_tells_what_was_rounded_off() {
+fn the_page_says_which_members_were_smoothed() {
     let wedge = [("wedge.csv", "0,0\n3,-1\n3,1\n")];
     let rounded = run_with(&wedge, "--curves 2 --shape file:wedge.csv --tau 1e-7 --t-end 2e-7 --solver direct");
     let page = rounded.text("report.html");
-    assert!(page.contains("Corners were rounded off in 2 members, in at most ") && page.contains(" % and put back."));
+    assert!(
+        page.contains("2 members were smoothed until the nodes resolved")
+            && page.contains(" %, which was then restored.")
+    );
     let untouched = run("--curves 2 --tau 1e-7 --t-end 2e-7 --solver direct").text("report.html");
-    assert!(!untouched.contains("Corners were"));
+    assert!(!untouched.contains("smoothed until"));
 }
 
 #[test]
@@ -273,4 +276,59 @@ fn members_of_the_page_move() {
     // A member that is round from the start only shows its circle, and the page says so.
     let round = run("--curves 1 --shape circle:1 --amplitude 0 --stop-when-relaxed").text("report.html");
     assert!(round.contains("member 0: relaxed at t = 0") && !round.contains("NaN"), "a member at rest");
+}
+
+#[test]
+fn driven_members_have_relaxed_and_vanished_each_at_its_own_time() {
+    let done = run("--curves 3 --points 40 --accurate --refine=false --drive 0.2");
+    let (page, members) = (done.text("report.html"), done.summary());
+    assert!(page.contains("<strong>3</strong> of 3 members relaxed") && !page.contains("failed"), "{page}");
+    let [relaxed, vanished] = ["t_relax", "t_vanish"].map(|column| shown(&members[0][column], 3));
+    assert_ne!(relaxed, vanished, "the control: another time");
+    assert!(page.contains(&format!("member 0: vanished at t = {vanished}")), "{vanished}");
+    assert!(page.contains("<dt>median t_vanish</dt>"), "{page}");
+    // A curve that is not driven vanishes nowhere.
+    assert!(!run(RUN).text("report.html").contains("vanished at t"));
+}
+
+#[test]
+fn a_page_says_once_what_ran_and_a_file_says_it_too() {
+    let done = run(RUN);
+    let what = "surface-diffusion, n = 40, adaptive 0.001";
+    assert_eq!(done.text("report.html").matches(what).count(), 1);
+    for name in plots(&done).into_iter().filter(|name| name.ends_with("svg") && name != "curves.svg") {
+        assert_eq!(done.text(&format!("plots/{name}")).matches(what).count(), 1, "{name}");
+    }
+}
+
+#[test]
+fn cells_without_quartiles_have_no_panel_of_quantiles() {
+    let of = |end: &str| {
+        let sweep = "--sweep amplitude=0.05,0.1 --sweep flow=surface-diffusion,willmore";
+        run(&format!("--curves 7 --points 40 --adaptive=1e-3 --t-end {end} {sweep}")).text("plots/distribution.svg")
+    };
+    let (some, all) = (of("1.5"), of("4"));
+    assert!(!some.contains("quartiles are not known"), "{some}");
+    let panels = |text: &str| text.matches(">standard normal quantile</text>").count();
+    assert_eq!((panels(&some), panels(&all)), (2, 4), "the control: both flows have quartiles later");
+    assert!(all.contains(">standardised quantile</text>") && all.contains(">standardised quantile of ln</text>"));
+}
+
+#[test]
+fn many_cells_that_no_number_orders_are_named_next_to_their_colours() {
+    let shapes: Vec<String> = (2..11).map(|lobes| format!("flower:{lobes}:0.05")).collect();
+    let sweep = |values: &str| run(&format!("--curves 2 --points 64 --adaptive=1e-2 --t-end 0.2 --sweep {values}"));
+    let survival = sweep(&format!("shape={}", shapes.join(";"))).text("plots/survival.svg");
+    assert!(shapes.iter().all(|shape| survival.contains(&format!(">{shape}</text>"))), "{survival}");
+    assert!(survival.contains(">shape</text>") && !survival.contains(">cell</text>"), "{survival}");
+    // Names too long to be told apart in the room that there is give way to numbers.
+    let alike: Vec<String> = (1..9).map(|i| format!("ellipse:2.000000000000{i},1")).collect();
+    let long = format!("circle:1;{}", alike.join(";"));
+    let numbered = sweep(&format!("shape={long}")).text("plots/survival.svg");
+    assert!(numbered.contains(">cell</text>") && !numbered.contains(">shape</text>"), "{numbered}");
+    let numbers = sweep("amplitude=0.011,0.022,0.033,0.044,0.055,0.066,0.077,0.088,0.099").text("plots/survival.svg");
+    assert!(
+        numbers.contains(">amplitude</text>") && !numbers.contains(">0.077</text>"),
+        "the control: an axis of numbers"
+    );
 }

@@ -11,7 +11,7 @@ use std::{
 use curvelax::{
     Error, Result,
     ensemble::{
-        Ended, Extent, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish,
+        Ended, Extent, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Spec, Study,
         request::spec::{BackendChoice, Store},
     },
     files::{
@@ -19,7 +19,7 @@ use curvelax::{
         state::checkpoint::{self, Origin},
     },
     placement,
-    report::{Form, Manner, Progress, RunReport, Stop},
+    report::{Progress, ReportOptions, ResultFormat, RunReport, Stop},
     simulate::resume,
 };
 
@@ -55,23 +55,23 @@ impl Sink for Impatient<'_> {
         if self.at_once && self.patience == 0 { Err(self.stopped()) } else { Ok(()) }
     }
 
-    fn wish(&mut self) -> Wish {
+    fn next_request(&mut self) -> SinkRequest {
         self.patience = self.patience.saturating_sub(1);
         match self.patience {
-            0 if !self.at_once => return Wish::Stop(self.stopped()),
+            0 if !self.at_once => return SinkRequest::Stop(self.stopped()),
             patience => self.waits |= patience.is_multiple_of(3),
         }
-        if self.waits { Wish::Checkpoint } else { Wish::Continue }
+        if self.waits { SinkRequest::Checkpoint } else { SinkRequest::Continue }
     }
 
-    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, progress: &RunProgress) -> Result<()> {
         self.waits = false;
-        self.report.checkpoint(standing)
+        self.report.checkpoint(progress)
     }
 }
 
-fn manner() -> Manner {
-    Manner {
+fn options() -> ReportOptions {
+    ReportOptions {
         since: Instant::now(),
         progress: Progress::Quiet,
         every: Duration::from_secs(1000),
@@ -88,20 +88,20 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
     placement::settle(&mut study, &choices);
     let (choice, cells) = (&choices[0], study.cells());
     let origin = Origin::new(&study, choice.platform(study.spec()))?;
-    let mut report = RunReport::begin(OutputFolder::open(out, false)?, &study, origin, manner())?;
-    let (mut standing, mut spilled) = (Standing::default(), 0);
+    let mut report = RunReport::begin(OutputFolder::open(out, false)?, &study, origin, options())?;
+    let (mut progress, mut spilled) = (RunProgress::default(), 0);
     for piece in 1.. {
         // More each time, so that the run ends although some of its work is lost.
         let patience = patience.saturating_add(piece / 4);
         let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
         let (mut backend, _) = choice.open_for(cells)?;
-        let done = resume(cells, choice.precision(), backend.as_mut(), 2, standing, &mut sink);
+        let done = resume(cells, choice.precision(), backend.as_mut(), 2, progress, &mut sink);
         spilled += sink.spilled;
         match done {
             Err(Error::Stopped(_)) => assert!(report.give_up()),
             done => {
                 done?;
-                report.finish(study.spec(), &[], Form::Overview)?;
+                report.finish(study.spec(), &[], ResultFormat::Overview)?;
                 return Ok((piece, spilled));
             }
         }
@@ -109,7 +109,7 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         assert!(state < 5 << 20, "a state of {state} bytes");
         let folder = OutputFolder::open_again(out)?;
         let kept = checkpoint::find(&folder)?.expect("a run that was interrupted");
-        (report, standing) = RunReport::resume(folder, &study, kept, manner())?;
+        (report, progress) = RunReport::resume(folder, &study, kept, options())?;
     }
     unreachable!("it ends")
 }

@@ -209,8 +209,8 @@ fn run_noted(arguments: &str) -> Vec<Row> {
     done.summary()
 }
 
-/// The radius of a circle under Willmore flow, R⁴ = R₀⁴ + 2Bt, and the rate of a small mode, 2·12·B/R⁴, in micrometres and
-/// hours; a tenth of the mobility takes ten times as long.
+/// The radius of a circle under Willmore flow, R⁴ = R₀⁴ + 2Bt, and the rate of a small mode, 2·12·B/R⁴, in micrometres
+/// and hours; a tenth of the mobility takes ten times as long.
 #[test]
 fn times_are_in_the_unit_of_the_mobility() {
     let circle = |mobility: &str, t_end: &str| {

@@ -210,8 +210,8 @@ fn refused(home: &Path, arguments: &str, words: &[&str]) {
     assert!(!home.join("no").exists(), "{arguments}: something was written");
 }
 
-/// A lock as a run holds it. It ends with `unlock` at once. A file that is only dropped may live on for a moment in a child
-/// that another test is starting.
+/// A lock as a run holds it. It ends with `unlock` at once. A file that is only dropped may live on for a moment in a
+/// child that another test is starting.
 fn locked(path: &Path) -> File {
     let lock = File::create(path).unwrap();
     lock.lock().unwrap();
@@ -368,7 +368,7 @@ fn what_is_missing_is_printed_with_the_line_that_submits_it() {
 
 #[cfg(unix)]
 #[test]
-fn what_is_missing_of_a_billion_shards_is_told_as_ranges() {
+fn missing_shards_among_a_billion_are_listed_as_ranges() {
     let home = TempDir::new().unwrap();
     let huge = "run --backend cpu --points 34 --tau 1e-3 --t-end 0.002 --curves 1000000000";
     let only = "--only 0,7,8,400000005,999999999";
@@ -430,7 +430,7 @@ fn a_task_of_a_job_array_knows_its_shard() {
 }
 
 #[test]
-fn one_line_begins_a_run_goes_on_with_it_and_leaves_it() {
+fn one_line_begins_a_run_continues_it_and_leaves_it() {
     let home = TempDir::new().unwrap();
     // A billion steps: it is never over.
     let long = SMALL.replace("1e-3", "1e-9").replace("0.01", "1");

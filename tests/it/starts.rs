@@ -31,7 +31,7 @@ fn the_program_is_started_in_one_place() {
 }
 
 #[test]
-fn settings_of_users_are_told_from_those_that_a_program_needs() {
+fn settings_of_users_are_distinguished_from_those_that_a_program_needs() {
     for name in ["NO_COLOR", "CLICOLOR_FORCE", "MESA_LOG_FILE", "RAYON_NUM_THREADS", "SLURM_ARRAY_TASK_MIN", "TERM"] {
         assert!(is_setting(name), "{name}");
     }

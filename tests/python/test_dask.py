@@ -100,7 +100,7 @@ class Over(AssertionError):
 
 
 def soon(look, study, meanwhile=lambda: None):
-    """The first result of `look` that is something, while the study goes on."""
+    """The first result of `look` that is something, while the study runs."""
     until = time.monotonic() + HANGS
     while time.monotonic() < until:
         if study.poll() is not None:
@@ -113,7 +113,7 @@ def soon(look, study, meanwhile=lambda: None):
 
 
 def is_over(process):
-    """Whether it has ended, even if nobody has asked how yet."""
+    """Whether it has ended, even if its result was not fetched yet."""
     return not process.is_running() or process.status() == psutil.STATUS_ZOMBIE
 
 

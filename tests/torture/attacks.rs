@@ -92,7 +92,7 @@ pub fn taken_away(study: &Study, other: &Study, stride: usize, seed: u64) -> Out
                 assert!(first.said.contains("out"), "{call} {n}: {first:?}");
             }
             if gone.exists() {
-                must_go_on(study, &attempt, &gone, &format!("{call} {n}: {first:?}"));
+                must_continue(study, &attempt, &gone, &format!("{call} {n}: {first:?}"));
             }
         }
     }
@@ -101,7 +101,7 @@ pub fn taken_away(study: &Study, other: &Study, stride: usize, seed: u64) -> Out
 }
 
 /// A folder that was moved away is resumed where it is.
-fn must_go_on(study: &Study, attempt: &Attempt, gone: &Path, told: &str) {
+fn must_continue(study: &Study, attempt: &Attempt, gone: &Path, told: &str) {
     let has = |name: &str| gone.join(name).exists();
     if has(".curvelax.state") || has(".curvelax.state.old") || has("run.json") {
         let ended = Running::start(&mut curvelax(attempt.home.path(), "resume gone --quiet")).end();

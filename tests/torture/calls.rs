@@ -63,8 +63,8 @@ pub enum From {
 }
 
 /// For each of `calls`, its first and last use by the thread that makes most of them, counted as `strace` counts.
-/// Those before the run uses its folder are left out: there is nothing to lose yet, and how many there are, and what for,
-/// depends on the system.
+/// Those before the run uses its folder are left out: there is nothing to lose yet, and how many there are, and what
+/// for, depends on the system.
 fn counts(prepared: &Prepared, calls: &[&str]) -> BTreeMap<String, RangeInclusive<usize>> {
     let list = TempDir::new().unwrap();
     let file = list.path().join("calls");

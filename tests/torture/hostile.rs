@@ -17,8 +17,8 @@ use crate::{
     study::{Attempt, Study},
 };
 
-/// Address space that is enough for the small runs of these tests, but not for reading a whole huge file. Threads need some
-/// of it, too, so that there must not be as many as cores.
+/// Address space that is enough for the small runs of these tests, but not for reading a whole huge file. Threads need
+/// some of it, too, so that there must not be as many as cores.
 const LITTLE: [&str; 3] =
     ["sh", "-c", "export RAYON_NUM_THREADS=1 MALLOC_ARENA_MAX=1; ulimit -v 1000000; exec \"$0\" \"$@\""];
 

@@ -28,7 +28,7 @@ pub fn curvelax(home: &Path, arguments: &str) -> Command {
 
 /// The same, started by another program such as `strace`.
 pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
-    let mut words = hearing().iter().chain(starter).map(PathBuf::from).chain([binary()]);
+    let mut words = handling().iter().chain(starter).map(PathBuf::from).chain([binary()]);
     let mut command = without_settings(Command::new(words.next().unwrap()), home);
     command.args(words).args(arguments.split_whitespace());
     command
@@ -36,7 +36,7 @@ pub fn through(home: &Path, starter: &[&str], arguments: &str) -> Command {
 
 /// A starter that makes a program receive signals: if these tests run in the background of a shell they ignore Ctrl-C,
 /// which is inherited. Empty if there is no such starter.
-fn hearing() -> &'static [&'static str] {
+fn handling() -> &'static [&'static str] {
     const ENV: [&str; 2] = ["env", "--default-signal=INT,HUP,TERM"];
     static HAS_ENV: OnceLock<bool> = OnceLock::new();
     if *HAS_ENV.get_or_init(|| succeeds(Command::new(ENV[0]).args([ENV[1], "true"]))) { &ENV } else { &[] }
@@ -127,7 +127,7 @@ impl Running {
     }
 
     /// Whether it has a handler for the signal `number`: before that, the signal ends it.
-    pub fn hears(&self, number: i32) -> bool {
+    pub fn handles(&self, number: i32) -> bool {
         let caught = status(self.id(), "SigCgt:").and_then(|mask| u64::from_str_radix(&mask, 16).ok());
         caught.is_some_and(|mask| mask >> (number - 1) & 1 == 1)
     }

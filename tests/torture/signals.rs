@@ -13,7 +13,8 @@ use crate::{
 };
 
 /// Maximum processor time of each thread that computes in which a run stops when asked: the program gives itself four
-/// seconds, and one is for the process to end. The wall time is only printed, as the machine may be busy with other work.
+/// seconds, and one is for the process to end. The wall time is only printed, as the machine may be busy with other
+/// work.
 const SOON: Duration = Duration::from_secs(5);
 /// The same for a run that is asked twice, which gives itself one second.
 const AT_ONCE: Duration = Duration::from_secs(2);
@@ -74,7 +75,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
         for _ in 0..2 {
             let time = study.reference().took.mul_f64(0.8 * random.real());
             running.wait_until(|running| running.age() >= time);
-            let hears = running.hears(number);
+            let handles = running.handles(number);
             running.signal(name);
             let ended = longest.end(running);
             let told = format!("{name} after {time:?} (seed {seed}): {ended:?}");
@@ -87,7 +88,7 @@ pub fn stop_at_random_times(studies: &[&Study], signals: &[(&str, i32, i32)], ca
                 }
                 _ if ended.had_not_begun() => {}
                 // It came before the program received signals.
-                (None, Some(found)) if found == number => assert!(!hears, "{told}"),
+                (None, Some(found)) if found == number => assert!(!handles, "{told}"),
                 (Some(0), _) => {}
                 _ => return Err(told.into()),
             }
@@ -115,7 +116,7 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
         running.signal("INT");
         sleep(Duration::from_millis(3).mul_f64(random.real()));
         let (first, mut pressed) = (Instant::now(), 0);
-        // Two signals that come before the first is handled count as one: whoever is not heard presses again.
+        // Two signals that come before the first is handled count as one: press again if nothing happens.
         let ended = longest.end_while(running, |running| {
             if first.elapsed() >= PRESSED_AGAIN * pressed {
                 running.signal("INT");
@@ -131,8 +132,8 @@ pub fn stop_twice(study: &Study, cases: usize, seed: u64) -> Outcome {
 /// How often a run is limited before it may finish.
 const LIMITED: usize = 3;
 
-/// A run limited to a second at a time, or more on a machine that needs more to begin. It is paused until its time is over,
-/// wherever it is by then, so that a run that needs less is stopped, too.
+/// A run limited to a second at a time, or more on a machine that needs more to begin. It is paused until its time is
+/// over, wherever it is by then, so that a run that needs less is stopped, too.
 pub fn a_second_at_a_time(studies: &[&Study]) -> Outcome {
     let (mut stops, mut seconds) = (0, 1);
     for study in studies {
@@ -165,7 +166,7 @@ fn limited(attempt: &Attempt, arguments: &str, seconds: u64) -> Ended {
     let arguments = format!("{arguments} --max-time {seconds}s");
     let mut running = Running::start(&mut curvelax(attempt.home.path(), &arguments));
     // Its clock starts when it begins to receive signals, and runs on while it is paused.
-    let is_caught = running.wait_until(|running| running.hears(15) && attempt.has_state());
+    let is_caught = running.wait_until(|running| running.handles(15) && attempt.has_state());
     if is_caught {
         running.signal("STOP");
         sleep(Duration::from_secs(seconds));

@@ -1,8 +1,8 @@
 //! A long run needs no more than a short one: memory and open files, sampled while it runs.
 //!
 //! The run would last for months and is stopped after enough samples, one each time its table has grown: samples are
-//! equally far apart in work, however fast it is done. They begin when it has saved its state twice, and so has done all
-//! that it will do again.
+//! equally far apart in work, however fast it is done. They begin when it has saved its state twice, and so has done
+//! all that it will do again.
 
 use std::fs;
 
@@ -43,7 +43,8 @@ pub fn constant(samples: usize, steps: u64) -> Outcome {
     assert!(ended.code == Some(75) && ended.errors().len() == 1, "{ended:?}");
     let rows = fs::read_to_string(&table).unwrap().lines().count() as u64 - 1;
     let bounds = |values: Vec<u64>| (*values.iter().min().unwrap(), *values.iter().max().unwrap());
-    // What a checkpoint needs for a moment is no growth: the least of the first quarter is compared with that of the last.
+    // What a checkpoint needs for a moment is no growth: the least of the first quarter is compared with that of the
+    // last.
     let memory: Vec<u64> = steady.iter().map(|sample| sample.0).collect();
     let least = |samples: &[u64]| *samples.iter().min().unwrap();
     let [before, after] = [&memory[..memory.len() / 4], &memory[memory.len() * 3 / 4..]].map(least);

@@ -19,7 +19,7 @@ fn with_two_states(study: &Study) -> Attempt<'_> {
     while since.elapsed() < HANGS {
         let attempt = Attempt::interrupted(study);
         let mut running = attempt.resume();
-        running.wait_until(|running| running.hears(15));
+        running.wait_until(|running| running.handles(15));
         running.signal("TERM");
         let ended = running.end();
         if ended.code == Some(75) && [NEWEST, BEFORE].iter().all(|name| attempt.out().join(name).is_file()) {

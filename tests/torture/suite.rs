@@ -39,7 +39,7 @@ static ADAPTIVE: Study = Study::new(
     "adaptive, csv",
     "--backend cpu --threads 1 --points 40 --curves 1200 --adaptive=2e-6 --stop-when-relaxed --series 0.1 --snapshots 0,0.1",
 );
-/// The same for some seven seconds, so that it is not done before a stop is heard, however busy the machine is.
+/// The same for some seven seconds, so that it is not done before a stop is noticed, however busy the machine is.
 static LONG: Study = Study::new(
     "adaptive, csv, long",
     "--backend cpu --threads 1 --points 40 --curves 4000 --adaptive=2e-6 --stop-when-relaxed --series 0.1 --snapshots 0,0.1",
@@ -228,7 +228,7 @@ fn calls_of_the_system(suite: &mut Suite, seed: u64) {
     }
     let (all, strides) = (suite.full, [suite.of(7, 1), suite.of(13, 1)]);
     for (name, study, from, stride) in [
-        ("every_call_fails_once_or_for_ever", &SHORT, From::Start, strides[0]),
+        ("every_call_fails_once_or_always", &SHORT, From::Start, strides[0]),
         ("every_call_fails_with_arrays", &SHORT_ZARR, From::Start, strides[1]),
         ("every_call_of_a_resumed_run_fails", &SHORT, From::Middle, strides[1]),
     ] {
@@ -285,8 +285,8 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     const SAME: &str = "0 differing bytes";
     let mount = (!space::can_mount()).then_some("right to mount");
     let gpu = no_gpu();
-    let nobody = surroundings::AsNobody::is_missing();
-    suite.test_if(nobody, "folders_that_cannot_be_written", "refused by name", || {
+    let unprivileged = surroundings::Unprivileged::is_missing();
+    suite.test_if(unprivileged, "folders_that_cannot_be_written", "refused by name", || {
         surroundings::folders_that_cannot_be_written(&SHORT)
     });
     suite.test_if(mount, "a_disk_that_is_read_only", "refused by name", || surroundings::read_only_disk(&TINY));
@@ -297,17 +297,17 @@ fn the_rest(suite: &mut Suite, seed: u64) {
     let most = suite.of(4, 12);
     suite.test_if(strace.or(gpu), "few_threads_on_the_gpu", NAMED, move || threads::few_on_the_gpu(&GPU, most));
     let limit = (!threads::can_limit()).then_some("prlimit");
-    suite.test_if(limit.or(nobody), "no_threads_left_for_signals", "stopped, 0 differing bytes", || {
+    suite.test_if(limit.or(unprivileged), "no_threads_left_for_signals", "stopped, 0 differing bytes", || {
         threads::none_left_for_signals(&LONG, &STOPS)
     });
-    suite.test_if(nobody, "no_rights_for_new_files", "refused by name", || {
+    suite.test_if(unprivileged, "no_rights_for_new_files", "refused by name", || {
         surroundings::no_rights_for_new_files(&SHORT)
     });
     let cases = suite.of(3, 50);
     suite.test("a_folder_that_vanishes", "a named error, no panic", move || {
         surroundings::vanished_folder(&SECOND, cases, seed)
     });
-    suite.test("nobody_listens", SAME, || surroundings::nobody_listens(&SHORT));
+    suite.test("no_reader_of_the_output", SAME, || surroundings::no_reader_of_the_output(&SHORT));
     suite.test("locales", SAME, || surroundings::locales(&SHORT));
     let faketime = (!surroundings::has_faketime()).then_some("faketime that works");
     suite.test_if(faketime, "wrong_clocks", SAME, || surroundings::wrong_clocks(&SHORT));

@@ -21,27 +21,27 @@ use crate::{
 };
 
 /// A user without rights, to whom root changes, since no folder is closed to root.
-const NOBODY: [&str; 4] = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
+const UNPRIVILEGED: [&str; 4] = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"];
 
 /// A run as a user who is bound by permissions.
-pub struct AsNobody {
+pub struct Unprivileged {
     /// A copy that this user may start, wherever the program was built.
     program: PathBuf,
     pub home: TempDir,
     is_root: bool,
 }
 
-impl AsNobody {
-    pub fn new() -> AsNobody {
+impl Unprivileged {
+    pub fn new() -> Unprivileged {
         let home = TempDir::new().unwrap();
         let program = home.path().join("curvelax");
-        // Not by this process: children that other tests start at this moment would have the copy open for writing, and a
-        // program that is open for writing cannot be started.
+        // Not by this process: children that other tests start at this moment would have the copy open for writing, and
+        // a program that is open for writing cannot be started.
         let copied = Command::new("cp").arg(binary()).arg(&program).status().unwrap();
         assert!(copied.success(), "{}", program.display());
         set_mode(&program, 0o755);
         set_mode(home.path(), 0o777);
-        AsNobody { program, home, is_root: is_root() }
+        Unprivileged { program, home, is_root: is_root() }
     }
 
     /// What such a user is missing here, if anything: setpriv, a temporary folder to enter and to start programs in, or
@@ -49,12 +49,12 @@ impl AsNobody {
     pub fn is_missing() -> Option<&'static str> {
         static WORKS: OnceLock<bool> = OnceLock::new();
         let works = WORKS.get_or_init(|| {
-            let nobody = AsNobody::new();
-            let closed = nobody.home.path().join("closed");
+            let unprivileged = Unprivileged::new();
+            let closed = unprivileged.home.path().join("closed");
             fs::create_dir(&closed).unwrap();
             set_mode(&closed, 0o555);
             let script = "\"$0\" --version && touch mine && ! touch closed/other";
-            let output = nobody.command(&["sh", "-c", script]).arg(&nobody.program).output();
+            let output = unprivileged.command(&["sh", "-c", script]).arg(&unprivileged.program).output();
             let works = output.as_ref().is_ok_and(|output| output.status.success());
             if !works {
                 eprintln!("as a user without rights: {output:?}");
@@ -75,7 +75,7 @@ impl AsNobody {
 
     /// A command run by this user.
     pub fn command(&self, words: &[&str]) -> Command {
-        let starter: &[&str] = if self.is_root { &NOBODY } else { &["env"] };
+        let starter: &[&str] = if self.is_root { &UNPRIVILEGED } else { &["env"] };
         let mut command = without_settings(Command::new(starter[0]), self.home.path());
         command.args(&starter[1..]).args(words);
         command
@@ -111,23 +111,23 @@ fn set_mode(path: &Path, mode: u32) {
 
 /// A read-only folder: a run is refused there, and a resumed one keeps its checkpoint.
 pub fn folders_that_cannot_be_written(study: &Study) -> Outcome {
-    let nobody = AsNobody::new();
-    let closed = nobody.home.path().join("closed");
+    let unprivileged = Unprivileged::new();
+    let closed = unprivileged.home.path().join("closed");
     fs::create_dir(&closed).unwrap();
     set_mode(&closed, 0o555);
-    let ended = nobody.go("022", &format!("run {} --out closed/out", study.arguments));
+    let ended = unprivileged.go("022", &format!("run {} --out closed/out", study.arguments));
     assert!(ended.code == Some(2) && ended.errors()[0].contains("closed/out"), "{ended:?}");
-    let ended = nobody.go("022", &format!("run {} --out closed --force", study.arguments));
+    let ended = unprivileged.go("022", &format!("run {} --out closed --force", study.arguments));
     assert!(ended.code == Some(2) && ended.errors()[0].contains("closed"), "{ended:?}");
-    let ended = nobody.go("022", "resume closed");
+    let ended = unprivileged.go("022", "resume closed");
     assert!(ended.code == Some(2) && ended.errors()[0].contains("closed"), "{ended:?}");
     assert_eq!(fs::read_dir(&closed).unwrap().count(), 0);
 
     let attempt = Attempt::interrupted(study);
     let before = attempt.names();
-    let out = nobody.copy(&attempt.out(), "out");
+    let out = unprivileged.copy(&attempt.out(), "out");
     set_mode(&out, 0o555);
-    let ended = nobody.go("022", "resume out");
+    let ended = unprivileged.go("022", "resume out");
     assert!(matches!(ended.code, Some(1 | 2)) && ended.errors()[0].contains("out"), "{ended:?}");
     assert!(out.join(".curvelax.state").exists());
     let after: Vec<String> = crate::folder::content(&out).into_keys().collect();
@@ -158,13 +158,13 @@ pub fn read_only_disk(study: &Study) -> Outcome {
 
 /// A mask that removes all rights from new files.
 pub fn no_rights_for_new_files(study: &Study) -> Outcome {
-    let nobody = AsNobody::new();
-    let out = nobody.home.path().join("out");
-    let ended = nobody.go("777", &format!("run {} --quiet --out out", study.arguments));
+    let unprivileged = Unprivileged::new();
+    let out = unprivileged.home.path().join("out");
+    let ended = unprivileged.go("777", &format!("run {} --quiet --out out", study.arguments));
     assert!(ended.code == Some(2) && ended.errors()[0].contains("out"), "{ended:?}");
     assert!(!out.exists(), "a folder was left");
     // Files that their owner may only write are enough for a run; reading them again gives an error that says so.
-    let ended = nobody.go("477", &format!("run {} --quiet --out out", study.arguments));
+    let ended = unprivileged.go("477", &format!("run {} --quiet --out out", study.arguments));
     must_be_a_decent_end(&ended, &format!("{ended:?}"));
     let attempt = Attempt::new(study);
     if is_unbound() {
@@ -201,8 +201,8 @@ pub fn vanished_folder(study: &Study, cases: usize, seed: u64) -> Outcome {
     Found::new(all, format!("a named error in {failed}, 0 panics"))
 }
 
-/// Nobody reads the output: pipes without a reader, closed streams, a full device.
-pub fn nobody_listens(study: &Study) -> Outcome {
+/// Output without a reader: pipes without a reader, closed streams, a full device.
+pub fn no_reader_of_the_output(study: &Study) -> Outcome {
     let talkative = |attempt: &Attempt| attempt.run().replace("--quiet ", "");
     let shells = ["exec \"$0\" ARGUMENTS >&-", "exec \"$0\" ARGUMENTS 2>&-", "exec \"$0\" ARGUMENTS >&- 2>&- <&-"];
     for shell in shells {

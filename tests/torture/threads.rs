@@ -10,7 +10,7 @@ use crate::{
     folder::copy,
     program::{Ended, Running, curvelax, is_there, through},
     study::{Attempt, Study},
-    surroundings::AsNobody,
+    surroundings::Unprivileged,
 };
 
 /// Starts `arguments` where the main thread can start only `room` threads.
@@ -157,27 +157,27 @@ enum Stop<'a> {
     MaxTime(u64),
 }
 
-/// Whether the run was still there to be stopped, and had begun; if so, it ends with `code`. A signal that was ignored from
-/// outside, as under `nohup`, stops nothing.
+/// Whether the run was still there to be stopped, and had begun; if so, it ends with `code`. A signal that was ignored
+/// from outside, as under `nohup`, stops nothing.
 fn stopped_without_threads(study: &'static Study, stop: Stop, code: i32) -> bool {
-    let nobody = AsNobody::new();
+    let unprivileged = Unprivileged::new();
     let more = match stop {
         Stop::Signal(..) => String::new(),
         Stop::MaxTime(seconds) => format!("--max-time {seconds}s"),
     };
     let arguments = format!("run {} --quiet --checkpoint-every 1s {more} --out out", study.arguments);
-    let mut running = nobody.start("022", &arguments);
-    let out = nobody.home.path().join("out");
+    let mut running = unprivileged.start("022", &arguments);
+    let out = unprivileged.home.path().join("out");
     let mut ignored = false;
     let is_caught = running.wait_until(|_| out.join(".curvelax.state").exists());
     if is_caught {
         running.signal("STOP");
         let id = running.id().to_string();
-        let lowered = nobody.command(&["prlimit", "--pid", &id, "--nproc=1:1"]).status().unwrap();
+        let lowered = unprivileged.command(&["prlimit", "--pid", &id, "--nproc=1:1"]).status().unwrap();
         assert!(lowered.success() || running.is_over(), "{stop:?}");
         match stop {
             Stop::Signal(name, number) => {
-                ignored = !running.hears(number);
+                ignored = !running.handles(number);
                 running.signal(name);
             }
             // Its time passes, however fast it is.

@@ -1,7 +1,7 @@
 // What a side has shown since its start, to be shown again.
 
 /** Bytes of the nodes that are kept, and the most frames. */
-const MOST_BYTES = 32e6, MOST_FRAMES = 300;
+const MAX_BYTES = 32e6, MAX_FRAMES = 300;
 
 export class Film {
   constructor() { Object.assign(this, { frames: [], seen: 0, stride: 1 }); }
@@ -12,7 +12,7 @@ export class Film {
     if (this.seen && (this.seen - 1) % this.stride) this.frames.pop();
     this.frames.push(frame);
     this.seen += 1;
-    const most = Math.min(MOST_FRAMES, Math.max(2, Math.floor(MOST_BYTES / frame.nodes.byteLength)));
+    const most = Math.min(MAX_FRAMES, Math.max(2, Math.floor(MAX_BYTES / frame.nodes.byteLength)));
     if (this.frames.length <= most) return;
     this.stride *= 2;
     const isLast = (i) => i === this.frames.length - 1;

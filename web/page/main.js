@@ -167,9 +167,9 @@ async function run() {
     side.tiles.canvas.hidden = false;
     side.says.textContent = "starts …";
     const worker = new Worker(new URL("worker.js", import.meta.url), { type: "module" });
-    const heard = (words) => own === last && hear(side, words);
-    worker.addEventListener("message", ({ data }) => heard(data));
-    worker.addEventListener("error", (event) => heard({ error: event.message || "the worker failed" }));
+    const received = (words) => own === last && receive(side, words);
+    worker.addEventListener("message", ({ data }) => received(data));
+    worker.addEventListener("error", (event) => received({ error: event.message || "the worker failed" }));
     side.worker = worker;
     const precision = place === "gpu" ? "f32" : "f64";
     worker.postMessage({ compiled, settings: { ...wanted, precision }, file: outline, place });
@@ -178,7 +178,7 @@ async function run() {
 }
 
 /** Takes a message of a worker. */
-function hear(side, { error, none, compiling, begins, frame }) {
+function receive(side, { error, none, compiling, begins, frame }) {
   if (none) {
     side.over = side.tiles.canvas.hidden = true;
     side.says.textContent = `– ${none}; the run is on the CPU alone.`;
@@ -193,7 +193,7 @@ function hear(side, { error, none, compiling, begins, frame }) {
   } else if (frame) {
     frame.ended.forEach((row) => side.rows.set(row.member, row));
     side.film.add({ nodes: frame.nodes, done: frame.done });
-    Object.assign(side, { frame, drawn: false, over: !frame.goesOn });
+    Object.assign(side, { frame, drawn: false, over: !frame.continues });
     const adapter = side.begins.adapter ? `, ${side.begins.adapter}` : "";
     side.says.textContent = `– ${frame.done} of ${side.begins.members} have ended${adapter}`;
     side.tiles.canvas.ariaLabel = `${side.label}: ${frame.done} of ${side.begins.members} members have ended`;

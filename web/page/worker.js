@@ -20,9 +20,9 @@ async function run(compiled, settings, file, place) {
   const { vendor = "", architecture = "", description = "" } = found?.info ?? {};
   postMessage({ begins: { members, n, times, adapter: description || `${vendor} ${architecture}`.trim() } });
   let kernel = null;
-  for (let goesOn = true; goesOn; ) {
+  for (let continues = true; continues; ) {
     const turn = instance.ask({ ask: "turn" });
-    goesOn = turn.goesOn;
+    continues = turn.continues;
     if (turn.frame) {
       const frame = instance.ask({ ask: "frame" });
       const [nodes, excess] = [instance.nodes(2 * members * n), instance.excess(members * times.length)];

@@ -24,7 +24,7 @@ use curvelax_flow::{
 };
 use serde_json::{Value, json};
 
-/// What comes back from every dispatch: the records, and all states, so that nobody has to wait for one.
+/// What comes back from every dispatch: the records, and all states, so that none has to be waited for.
 const BACK: [Binding; 3] = [Binding::Counters, Binding::Reports, Binding::States];
 /// The bindings of the kernel, which is not traced.
 const BOUND: usize = Binding::Trace as usize;

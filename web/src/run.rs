@@ -9,12 +9,12 @@ use curvelax_backend::{
 };
 use curvelax_curve::polygon;
 use curvelax_ensemble::{
-    Cell, Ended, Sink, Standing, Study,
+    Cell, Ended, RunProgress, Sink, Study,
     outcome::wulff_outline,
     request::spec::Precision,
     schedule::grid,
     simulate::{Roster, Simulation},
-    trajectory::Placing,
+    trajectory::UserFrame,
 };
 use curvelax_flow::{
     equilibrium::Equilibrium,
@@ -74,7 +74,7 @@ pub struct Run {
     hardware: Option<bool>,
     /// Members told to the page.
     told: usize,
-    goes_on: bool,
+    continues: bool,
     nodes: Vec<f32>,
     excess: Vec<f64>,
     /// For each member of a crystal the Wulff shape of its first state, or of its last one.
@@ -115,7 +115,7 @@ impl Run {
         };
         // Without portraits, which the page does not show, and for which members would pause.
         let roster = Box::leak(Box::new(Roster::new(study.cells(), precision, 0)));
-        let simulation = Simulation::new(roster, members, 1, Standing::default()).map_err(told)?;
+        let simulation = Simulation::new(roster, members, 1, RunProgress::default()).map_err(told)?;
         let times: Vec<f64> = grid(spec.final_time()).collect();
         let gpu = if let Device::Gpu(gpu) = &device { Some(gpu.description()) } else { None };
         let answer = json!({ "members": members, "n": spec.points, "times": times, "gpu": gpu });
@@ -133,7 +133,7 @@ impl Run {
             ended: Vec::new(),
             hardware,
             told: 0,
-            goes_on: true,
+            continues: true,
             nodes: vec![f32::NAN; 2 * members * spec.points],
             excess: vec![f64::NAN; members * times.len()],
             rests: Vec::new(),
@@ -149,15 +149,15 @@ impl Run {
     /// Takes a turn. The answer has the dispatch that is to be made before the next one, and whether a frame is due.
     pub fn turn(&mut self) -> Result<Value, String> {
         let gone = self.simulation.turn(&mut self.watched, &mut Collected(&mut self.ended));
-        self.goes_on = gone.map_err(|error| error.to_string())?;
+        self.continues = gone.map_err(|error| error.to_string())?;
         for (slot, trajectory) in self.simulation.resident() {
             self.watched.placed[slot] = Some((trajectory.index(), trajectory.placing()));
         }
         let Run { watched: Watched { device, .. }, kept, .. } = self;
         let dispatch = if let Device::Gpu(gpu) = device { gpu.fetch(kept) } else { None };
         self.since = Instant::now();
-        let frame = self.watched.is_due || !self.goes_on;
-        Ok(json!({ "goesOn": self.goes_on, "dispatch": dispatch, "frame": frame }))
+        let frame = self.watched.is_due || !self.continues;
+        Ok(json!({ "continues": self.continues, "dispatch": dispatch, "frame": frame }))
     }
 
     /// Takes what came back from the GPU.
@@ -203,7 +203,7 @@ impl Run {
         Ok(json!({
             "ended": new.iter().map(|ended| self.row(ended)).collect::<Vec<_>>(),
             "done": self.ended.len(),
-            "goesOn": self.goes_on,
+            "continues": self.continues,
             "rests": self.rests.len(),
             "mean": self.mean(),
             "times": self.relaxed,
@@ -285,11 +285,11 @@ impl Sink for Collected<'_> {
 struct Watched {
     device: Device,
     /// The member in each slot, after the last turn.
-    placed: Vec<Option<(u64, Placing)>>,
+    placed: Vec<Option<(u64, UserFrame)>>,
     /// Their states, when a frame is due.
     states: Vec<Option<State<f64>>>,
     /// The last states of members that have left.
-    last: Vec<(u64, Placing, State<f64>)>,
+    last: Vec<(u64, UserFrame, State<f64>)>,
     seen: Option<Instant>,
     is_due: bool,
 }

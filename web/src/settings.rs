@@ -8,9 +8,9 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// Maximum members of a page: more do not show.
-const MOST_MEMBERS: u64 = 1024;
+const MAX_MEMBERS: u64 = 1024;
 /// Maximum nodes of all members together, for the memory of a phone.
-const MOST_NODES: u64 = 1 << 18;
+const MAX_NODES: u64 = 1 << 18;
 /// Members of the command that does the same, larger.
 const LARGER: u64 = 10_000;
 /// What `--adaptive` on the page stands for: `--accurate` without the two coarser runs that estimate its error.
@@ -74,9 +74,9 @@ impl Settings {
         });
         let study = Study::new(Spec::from_toml(&toml)?).map_err(|error| error.to_string())?;
         let (members, n) = (study.member_count(), study.points() as u64);
-        if members > MOST_MEMBERS || members.saturating_mul(n) > MOST_NODES {
+        if members > MAX_MEMBERS || members.saturating_mul(n) > MAX_NODES {
             return Err(format!(
-                "{members} members of {n} nodes: this page shows at most {MOST_MEMBERS}, and {MOST_NODES} nodes \
+                "{members} members of {n} nodes: this page shows at most {MAX_MEMBERS}, and {MAX_NODES} nodes \
                  together; use fewer, or the program"
             ));
         }

@@ -114,8 +114,8 @@ pub const DECAY: [Bound; 2] =
 ///
 /// All of these depend on where a step happened to begin or end. The error of the error estimate is a rounding of the
 /// solve, ε·√w with w the largest weight, as often as the combination of the rows amplifies it, so relative to the
-/// tolerance; the relative error of a step length is a fraction of that. A quantity inside the run is off by this fraction of its change over a step, in addition to
-/// its own scale.
+/// tolerance; the relative error of a step length is a fraction of that. A quantity inside the run is off by this
+/// fraction of its change over a step, in addition to its own scale.
 pub const PACE: [Bound; 6] = [
     bound("last step's start", NaturalScale::Position, 16.0, 64.0),
     bound("its middle", NaturalScale::Position, 16.0, 64.0),
@@ -135,7 +135,8 @@ pub fn growth(steps: u32) -> f64 {
 }
 
 /// Returns the bound of the difference between the times at which the excess of a member falls to a level in a kernel
-/// and in its twin, after `steps` fixed steps in numbers of type `T` (see [`EVENT`]); there it falls by `slope` per time.
+/// and in its twin, after `steps` fixed steps in numbers of type `T` (see [`EVENT`]); there it falls by `slope` per
+/// time.
 ///
 /// ```
 /// use curvelax_backend::bounds::excess_time;

@@ -167,8 +167,8 @@ pub fn with_short_words(message: &str) -> String {
     words.map(|word| if word.len() > most { ends(word) } else { word.to_owned() }).collect()
 }
 
-/// What a reader of TOML or JSON says is wrong, in words that do not take Rust, its values shortened. The names of types
-/// are those of serde: `invalid type: string "x", expected f64` becomes `expected a number, found the text "x"`.
+/// What a reader of TOML or JSON says is wrong, in words that do not take Rust, its values shortened. The names of
+/// types are those of serde: `invalid type: string "x", expected f64` becomes `expected a number, found the text "x"`.
 pub fn plainly(message: &str) -> String {
     // JSON ends with the place, which TOML puts before.
     let (what, place) = match message.rfind(" at line ") {
@@ -304,7 +304,7 @@ mod tests {
         }
     }
     #[test]
-    fn no_likeness_is_sought_for_a_word_without_end() {
+    fn no_similar_name_is_suggested_for_an_overlong_word() {
         // A search would take hours.
         let endless = "tau".repeat(10_000_000);
         assert_eq!(nearest(&endless, [format!("x{endless}").as_str()]), None);
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn what_serde_says_is_told_without_types_of_rust() {
+    fn errors_of_serde_are_shown_without_types_of_rust() {
         for (said, told) in [
             ("invalid type: string \"x\", expected f64", "expected a number, found the text \"x\""),
             (

@@ -112,7 +112,7 @@ pub fn text(path: &Path, most: u64) -> io::Result<String> {
     })
 }
 
-/// A reader that fails if a line is longer than [`MAX_LINE`] bytes, or leaves a quote open, so that nobody who reads CSV
+/// A reader that fails if a line is longer than [`MAX_LINE`] bytes, or leaves a quote open, so that no reader of CSV
 /// holds more than that.
 pub struct Lines<R> {
     inner: R,

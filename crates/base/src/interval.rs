@@ -27,7 +27,7 @@ impl Interval {
     }
 
     /// `95 % interval 0.401 to 0.42`, `95 % interval 0.401 or more`, `range of 4, 0.401 to 0.42, covers 87.5 %`.
-    pub fn told(&self, shown: impl Fn(f64) -> String) -> String {
+    pub fn in_words(&self, shown: impl Fn(f64) -> String) -> String {
         let ends = self.ends(shown);
         match self.range_of {
             None => format!("95 % interval {ends}"),
@@ -36,7 +36,7 @@ impl Interval {
     }
 
     /// `95 %: 0.401 to 0.42`, `range of 4, covers 87.5 %: 0.401 to 0.42`.
-    pub fn told_shortly(&self, shown: impl Fn(f64) -> String) -> String {
+    pub fn in_short(&self, shown: impl Fn(f64) -> String) -> String {
         let ends = self.ends(shown);
         match self.range_of {
             None => format!("95 %: {ends}"),
@@ -64,7 +64,7 @@ mod tests {
 
     #[test]
     fn an_interval_says_what_it_covers_and_where_it_is_open() {
-        let told = |interval: Interval| [interval.told(|x| x.to_string()), interval.told_shortly(|x| x.to_string())];
+        let told = |interval: Interval| [interval.in_words(|x| x.to_string()), interval.in_short(|x| x.to_string())];
         let closed = Interval::between(0.5, 0.75);
         assert_eq!(told(closed), ["95 % interval 0.5 to 0.75", "95 %: 0.5 to 0.75"]);
         let open = Interval { upper: None, ..closed };

@@ -1,5 +1,6 @@
-//! What every crate of curvelax uses: errors that name what, where, the numbers and the remedy; files opened for reading;
-//! numbers as text, and intervals that say what they cover; random numbers addressed by key; threads and guards against panics of other crates.
+//! What every crate of curvelax uses: errors that name what, where, the numbers and the remedy; files opened for
+//! reading; numbers as text, and intervals that say what they cover; random numbers addressed by key; threads and
+//! guards against panics of other crates.
 
 pub mod drawable;
 pub mod error;

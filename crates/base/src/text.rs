@@ -3,7 +3,29 @@
 use std::path::Path;
 
 /// Significant digits that tell any two numbers apart.
-const MOST_DIGITS: usize = 17;
+const MAX_DIGITS: usize = 17;
+
+/// Conversions between types that are written as text, for serde: by their `Display` and `FromStr`.
+#[macro_export]
+macro_rules! as_text {
+    ($($name:ident)*) => {
+        $(
+            impl From<$name> for String {
+                fn from(value: $name) -> String {
+                    value.to_string()
+                }
+            }
+
+            impl TryFrom<String> for $name {
+                type Error = String;
+
+                fn try_from(text: String) -> std::result::Result<$name, String> {
+                    text.parse()
+                }
+            }
+        )*
+    };
+}
 
 /// `value` with `digits` significant digits: plain from 10⁻³ to 10⁶, otherwise with a power of ten.
 pub fn significant(value: f64, digits: usize) -> String {
@@ -39,14 +61,14 @@ pub fn rounded(value: f64, digits: usize) -> String {
     scientific.parse().map_or_else(|_| value.to_string(), number)
 }
 
-/// `value` rounded to two significant digits, or to as many more as show on which side of `limit` it is; `no interval` if
-/// it is infinite.
+/// `value` rounded to two significant digits, or to as many more as show on which side of `limit` it is; `no interval`
+/// if it is infinite.
 pub fn rounded_beside(value: f64, limit: f64) -> String {
     if !value.is_finite() {
         return "no interval".into();
     }
     let shows = |text: &String| text.parse::<f64>().is_ok_and(|shown| (shown > limit) == (value > limit));
-    (2..).map(|digits| rounded(value, digits)).take(MOST_DIGITS).find(shows).unwrap_or_else(|| number(value))
+    (2..).map(|digits| rounded(value, digits)).take(MAX_DIGITS).find(shows).unwrap_or_else(|| number(value))
 }
 
 /// A probability with its sign: `p = 0.35`, `p = 2.1e-19`. It is never 0.
@@ -99,8 +121,8 @@ pub fn listed(names: &[String], most: usize, between: &str) -> String {
     text
 }
 
-/// `path` as a word of a command line, for bash, zsh and the like, and on Windows for both of its shells: in quotes if it
-/// needs them. It is always on one line.
+/// `path` as a word of a command line, for bash, zsh and the like, and on Windows for both of its shells: in quotes if
+/// it needs them. It is always on one line.
 pub fn quoted(path: &Path) -> String {
     // A path that begins with a dash would be read as a flag.
     let dashed = path.as_os_str().as_encoded_bytes().starts_with(b"-");

@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_system_without_threads_is_told_with_what_helps() {
+    fn a_system_without_threads_is_an_error_with_a_remedy() {
         let error = no_more("1 thread", "", &"no");
         assert_eq!(error.exit_code(), 1);
         assert_eq!(error.to_string(), format!("cannot start 1 thread: no; {REMEDY}"));

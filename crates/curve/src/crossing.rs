@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_search_ends_where_it_is_told_to() {
+    fn a_search_ends_at_its_bound() {
         assert_eq!(crossing(&aslant_comb(300)), None);
         assert_eq!(crossing_within(&aslant_comb(300), 10_000_000), Ok(None));
         assert_eq!(crossing_within(&aslant_comb(300), 10_000), Err(Undecided));

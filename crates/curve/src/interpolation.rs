@@ -11,8 +11,8 @@ use super::{BaseCurve, Outline, Spline, crossing};
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
     /// As a cubic spline, with corners where the direction turns by more than
-    /// [`MAX_SMOOTH_TURN`](super::MAX_SMOOTH_TURN); as a polygon if all points are corners, or if the spline would cross
-    /// itself where the polygon does not.
+    /// [`MAX_SMOOTH_TURN`](super::MAX_SMOOTH_TURN); as a polygon if all points are corners, or if the spline would
+    /// cross itself where the polygon does not.
     #[default]
     Auto,
     /// As a cubic spline without corners.
@@ -21,10 +21,10 @@ pub enum Interpolation {
     Polygon,
 }
 
-/// Samples between two points by which the spline is searched for crossings, and most samples in all: so many points are so
-/// close that the spline is next to the polygon.
+/// Samples between two points by which the spline is searched for crossings, and most samples in all: so many points
+/// are so close that the spline is next to the polygon.
 const SAMPLES: usize = 8;
-const MOST_SAMPLES: usize = 200_000;
+const MAX_SAMPLES: usize = 200_000;
 
 impl Interpolation {
     /// Names in flags and files.
@@ -61,7 +61,7 @@ fn crosses(spline: &Spline, points: usize) -> bool {
     let pieces = points * SAMPLES;
     let mut samples: Vec<_> = spline.subdivision(pieces).map(|(_, point)| point).collect();
     samples.pop();
-    pieces <= MOST_SAMPLES && crossing(&samples).is_some()
+    pieces <= MAX_SAMPLES && crossing(&samples).is_some()
 }
 
 #[cfg(test)]
@@ -99,8 +99,8 @@ mod tests {
 
     #[test]
     fn a_spline_that_would_cross_is_only_made_if_it_is_asked_for() {
-        // A bow of two sides that nearly touch: few points on the inner one, between which a spline swings out, and many on
-        // the outer one, which has the same corners.
+        // A bow of two sides that nearly touch: few points on the inner one, between which a spline swings out, and
+        // many on the outer one, which has the same corners.
         let corner = |i: i32| DVec2::from_angle(TAU * f64::from(i) / 14.0);
         let outer =
             (0..8).rev().flat_map(|i| (0..10).map(move |j| corner(i + 1).lerp(corner(i), 0.1 * f64::from(j)) * 1.005));

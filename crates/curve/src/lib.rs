@@ -1,9 +1,10 @@
 //! Plane-curve mathematics in f64: shapes, perturbations, sampling into nodes, and measures of polygons.
 //!
-//! A [`Shape`] is what a user writes; [`outlines`] reads those of files. [`Shape::resolve`] turns it into a [`BaseCurve`], a closed curve that can be
-//! evaluated at any parameter `u`. A [`RadialFactor`] maps the plane about the curve's centroid, which turns the
-//! base curve into a different curve for each member of an ensemble. A [`Sampler`] finally places n nodes on
-//! it. Nothing here draws random numbers: the ensemble does, and passes amplitudes and phases.
+//! A [`Shape`] is what a user writes; [`outlines`] reads those of files. [`Shape::resolve`] turns it into a
+//! [`BaseCurve`], a closed curve that can be evaluated at any parameter `u`. A [`RadialFactor`] maps the plane about
+//! the curve's centroid, which turns the base curve into a different curve for each member of an ensemble. A
+//! [`Sampler`] finally places n nodes on it. Nothing here draws random numbers: the ensemble does, and passes
+//! amplitudes and phases.
 //!
 //! Nodes are numbered i = 1…n, counter-clockwise, as in the paper, and stored at index i-1.
 

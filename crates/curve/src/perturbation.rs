@@ -4,11 +4,11 @@
 //! p ↦ c + (p - c)·(1 + Σ_m a_m cos(mθ + φ_m)),   m = low…high,
 //! ```
 //!
-//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform; or, for [`Perturbation::Gaussian`], with
-//! independent normal coefficients of cos and sin. The factor depends only on the angle.
-//! While it is positive, the map therefore takes each ray onto itself, is one-to-one, and preserves embedding and
-//! orientation, whether or not the curve is star-shaped about c. Draws whose factor falls below [`MIN_FACTOR`] are
-//! redrawn, which cuts off the tails of the normal law.
+//! with θ the polar angle of `p - c`, `a_m ~ N(0, (σ m^-p)²)` and `φ_m` uniform; or, for [`Perturbation::Gaussian`],
+//! with independent normal coefficients of cos and sin. The factor depends only on the angle. While it is positive, the
+//! map therefore takes each ray onto itself, is one-to-one, and preserves embedding and orientation, whether or not the
+//! curve is star-shaped about c. Draws whose factor falls below [`MIN_FACTOR`] are redrawn, which cuts off the tails of
+//! the normal law.
 //!
 //! With `z = (p - c)/|p - c|`, a point of the unit circle in the complex plane, the sum is the real part of
 //! `z^low·Σ_j d_j z^j`, `d_j = a_m e^{iφ_m}` at `m = low + j`: a complex polynomial, evaluated by Horner's rule,
@@ -42,8 +42,8 @@ const ANGLES_PER_PERIOD: u32 = 64;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Perturbation {
-    /// A normal amplitude and a uniform phase. The coefficients of cos and sin are uncorrelated but not independent, with
-    /// kurtosis 4.5.
+    /// A normal amplitude and a uniform phase. The coefficients of cos and sin are uncorrelated but not independent,
+    /// with kurtosis 4.5.
     #[default]
     AmplitudePhase,
     /// Independent normal coefficients of cos and sin, with kurtosis 3: the radius is a Gaussian process.
@@ -95,18 +95,7 @@ impl FromStr for Modes {
     }
 }
 
-impl From<Modes> for String {
-    fn from(modes: Modes) -> String {
-        modes.to_string()
-    }
-}
-
-impl TryFrom<String> for Modes {
-    type Error = String;
-    fn try_from(text: String) -> Result<Modes, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Modes);
 
 /// The validated law of the perturbation: σ, the modes and p.
 #[derive(Clone, Copy, Debug, PartialEq)]

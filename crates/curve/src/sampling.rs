@@ -68,18 +68,7 @@ impl FromStr for Sampling {
     }
 }
 
-impl From<Sampling> for String {
-    fn from(sampling: Sampling) -> String {
-        sampling.to_string()
-    }
-}
-
-impl TryFrom<String> for Sampling {
-    type Error = String;
-    fn try_from(text: String) -> Result<Sampling, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Sampling);
 
 /// A base curve prepared for sampling into n nodes, whatever its perturbation.
 pub struct Sampler {
@@ -180,8 +169,8 @@ impl Sampler {
         }
     }
 
-    /// Returns the signed area of the curve stretched by `factor`, from the samples by which its length is measured: that
-    /// of an outline does not depend on the number of nodes.
+    /// Returns the signed area of the curve stretched by `factor`, from the samples by which its length is measured:
+    /// that of an outline does not depend on the number of nodes.
     pub fn area(&self, factor: &RadialFactor) -> f64 {
         let centre = self.curve.centroid();
         match &self.plan {

@@ -250,18 +250,7 @@ impl fmt::Display for FlowerMode {
     }
 }
 
-impl From<Shape> for String {
-    fn from(shape: Shape) -> String {
-        shape.to_string()
-    }
-}
-
-impl TryFrom<String> for Shape {
-    type Error = String;
-    fn try_from(text: String) -> Result<Shape, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Shape);
 
 impl FromStr for Shape {
     type Err = String;

@@ -1,19 +1,20 @@
 //! A closed cubic spline through points, with corners at some of them.
 //!
-//! *Theory.* Piece i is a cubic of a parameter that grows by the chord `h_i` from point i to point i + 1, with the second
-//! derivatives `M_i` and `M_{i+1}` at its ends. The first derivative is continuous at a smooth point if
+//! *Theory.* Piece i is a cubic of a parameter that grows by the chord `h_i` from point i to point i + 1, with the
+//! second derivatives `M_i` and `M_{i+1}` at its ends. The first derivative is continuous at a smooth point if
 //!
 //! ```text
 //! h_{i-1} M_{i-1} + 2(h_{i-1} + h_i) M_i + h_i M_{i+1} = 6 (e_i/h_i - e_{i-1}/h_{i-1}),   e_i = p_{i+1} - p_i.
 //! ```
 //!
-//! At a corner pieces end: the second derivative of the last piece is constant, `M_i = M_{i-1}` seen from before and `M_{i+1}`
-//! seen from behind. An arc thus keeps its curvature up to its end, and a piece between two corners is straight.
+//! At a corner pieces end: the second derivative of the last piece is constant, `M_i = M_{i-1}` seen from before and
+//! `M_{i+1}` seen from behind. An arc thus keeps its curvature up to its end, and a piece between two corners is
+//! straight.
 //!
-//! The parameter goes with the chord, not with its root. A chord differs from its arc in third order alone, so the spline is
-//! exact to fourth order whatever the spacing of the points; with the root, which is called centripetal, it is of second order
-//! (`points_at_unequal_distances_are_interpolated_to_fourth_order`). The root prevents loops where the direction turns
-//! sharply, but there are corners.
+//! The parameter goes with the chord, not with its root. A chord differs from its arc in third order alone, so the
+//! spline is exact to fourth order whatever the spacing of the points; with the root, which is called centripetal, it
+//! is of second order (`points_at_unequal_distances_are_interpolated_to_fourth_order`). The root prevents loops where
+//! the direction turns sharply, but there are corners.
 
 use glam::DVec2;
 
@@ -150,8 +151,8 @@ impl Spline {
         self.pieces[piece].point(share)
     }
 
-    /// Returns `(u, point)` once round: every point of the spline, and between them pieces no longer than about `length /
-    /// pieces`.
+    /// Returns `(u, point)` once round: every point of the spline, and between them pieces no longer than about `length
+    /// / pieces`.
     pub(super) fn subdivision(&self, pieces: usize) -> impl Iterator<Item = (f64, DVec2)> {
         let length = self.length();
         let along = move |(i, piece): (usize, &CubicPiece)| {

@@ -10,7 +10,7 @@ use super::{
     medium::Medium,
     style,
     svg::{Svg, coordinate, dots},
-    width::{SIZE, TITLE, shortened, width, wrapped},
+    width::{SIZE, TITLE, distinct, shortened, width, wrapped},
 };
 use curvelax_base::{interval::Interval, text::significant};
 
@@ -23,6 +23,8 @@ pub const HEADING: f64 = 22.0;
 
 const TITLE_LINE: f64 = 20.0;
 const LINE: f64 = 17.0;
+/// Most pixels of a name next to a colour bar.
+const MAX_NAME: f64 = 90.0;
 const LEGEND_LINE: f64 = 20.0;
 const SAMPLE: f64 = 26.0;
 const AXIS_SIZE: f64 = 13.0;
@@ -47,7 +49,7 @@ impl EstimatedNumber {
     pub fn shown(&self) -> String {
         let value = significant(self.value, 3);
         match self.interval {
-            Some(interval) => format!("{value} ({})", interval.told_shortly(|end| significant(end, 3))),
+            Some(interval) => format!("{value} ({})", interval.in_short(|end| significant(end, 3))),
             None => value,
         }
     }
@@ -78,7 +80,7 @@ pub enum LegendMark {
     Right,
     /// The short stroke of a censored member.
     Stroke,
-    /// Nothing: its label goes on from the line above.
+    /// Nothing: its label continues the line above.
     More,
 }
 
@@ -183,7 +185,7 @@ impl Heading<'_> {
     pub fn begin(&self, medium: Medium, body: f64) -> (Svg, f64) {
         let (full, room) = (medium.width(), medium.width() - 2.0 * MARGIN);
         let (titles, lines) = match medium {
-            Medium::Screen => {
+            Medium::Screen | Medium::Page => {
                 let lines = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
                 (wrapped(self.title, TITLE, room), lines)
             }
@@ -213,13 +215,13 @@ impl Heading<'_> {
         (svg, top)
     }
 
-    /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the text
-    /// of the page has the rest, and broken into lines on paper.
+    /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the
+    /// text of the page has the rest, and broken into lines on paper.
     fn rows(&self, room: f64, medium: Medium) -> Vec<Vec<(f64, Entry)>> {
         let most = room - SAMPLE - 6.0;
         let fitted = |entry: &Entry| -> Vec<Entry> {
             let lines = match medium {
-                Medium::Screen => vec![shortened(&entry.label, SIZE, most)],
+                Medium::Screen | Medium::Page => vec![shortened(&entry.label, SIZE, most)],
                 Medium::Paper(_) => wrapped(&entry.label, SIZE, most),
             };
             let mark = |i: usize| if i == 0 { entry.mark } else { LegendMark::More };
@@ -408,8 +410,10 @@ pub struct CellKey {
     pub name: String,
     /// Two quantities, of which colours show one and dashes or panels the other.
     pub crossed: Option<Crossed>,
+    /// Names of the curves for the colour bar, if the quantity is no number: those next to its colours.
+    pub names: Vec<String>,
     /// Another legend names the curves, as one for all charts of a page does.
-    pub is_told: bool,
+    pub named_elsewhere: bool,
 }
 
 impl From<&str> for CellKey {
@@ -477,7 +481,13 @@ impl Colours {
         }
         let known = |value: &f64| Scale::Linear.holds(*value);
         let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
-        let name = if given.is_some() { &cells.name[..] } else { "cell" };
+        let names = if given.is_none() && key.names.len() == count { key.names } else { Vec::new() };
+        let names = distinct(&names, SIZE, MAX_NAME);
+        // Names that stay wide leave no room for curves.
+        let fit = names.iter().all(|name| width(name, SIZE) <= MAX_NAME);
+        let names = if fit { names } else { Vec::new() };
+        let name = if given.is_some() || !names.is_empty() { &cells.name[..] } else { "cell" };
+        let key = CellKey { names, ..key };
         let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
         let scale = Scale::of(values.iter().copied());
         let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
@@ -502,7 +512,7 @@ impl Colours {
     pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
         let named = |(i, class): &(usize, String)| Entry::new(class, LegendMark::Series, label(*i));
         let entries: Vec<Entry> = match &self.key.crossed {
-            _ if self.key.is_told => Vec::new(),
+            _ if self.key.named_elsewhere => Vec::new(),
             Some(crossed) if crossed.places.len() >= self.shown.len() => crossed.entries(),
             _ if self.bar.is_none() => self.shown.iter().map(named).collect(),
             _ => Vec::new(),
@@ -511,8 +521,8 @@ impl Colours {
     }
 
     /// Whether another legend names the curves.
-    pub fn is_told(&self) -> bool {
-        self.key.is_told
+    pub fn named_elsewhere(&self) -> bool {
+        self.key.named_elsewhere
     }
 
     /// The marker of the curve drawn at this rank: ordered colours need no shapes.
@@ -530,7 +540,16 @@ impl Colours {
 
     /// Space for the colour bar next to a panel of this height.
     pub fn room(&self, height: f64) -> f64 {
-        self.bar.as_ref().map_or(0.0, |bar| 2.0 * BAR + Panel::left(bar, height) - MARGIN)
+        let Some(bar) = &self.bar else { return 0.0 };
+        let names = self.names(height).into_iter().map(|(_, name)| width(&name, SIZE)).reduce(f64::max);
+        2.0 * BAR + names.map_or(Panel::left(bar, height) - MARGIN, |widest| widest + AXIS_SIZE + 16.0)
+    }
+
+    /// Names next to a colour bar of this height, with the numbers of their curves: as many as there is room for.
+    fn names(&self, height: f64) -> Vec<(f64, String)> {
+        let names = &self.key.names;
+        let step = names.len().div_ceil(((height / LINE) as usize).max(1)).max(1);
+        names.iter().enumerate().step_by(step).map(|(i, name)| (i as f64, name.clone())).collect()
     }
 
     /// Draws the colour bar at the right of a panel.
@@ -545,9 +564,10 @@ impl Colours {
             svg.rectangle("solid", at, DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 }), 0.0);
             svg.close();
         }
-        let ticks = bar.ticks_upwards(panel.size.y);
+        let (ticks, names) = (bar.ticks_upwards(panel.size.y), self.names(panel.size.y));
+        let labelled = if names.is_empty() { &ticks.labelled } else { &names };
         let mut right: f64 = 0.0;
-        for (value, label) in &ticks.labelled {
+        for (value, label) in labelled {
             let y = panel.end().y - panel.size.y * bar.share(*value);
             svg.path("ticks", &format!("M{} {}h3", coordinate(corner.x + BAR), coordinate(y)));
             svg.text("tick", DVec2::new(corner.x + BAR + 6.0, y + 4.0), label);

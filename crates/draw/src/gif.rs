@@ -46,7 +46,7 @@ impl Palette {
     }
 }
 
-/// A GIF that grows by frames and repeats for ever.
+/// A GIF that grows by frames and repeats without end.
 pub struct MovingGif {
     encoder: Encoder<Vec<u8>>,
     palette: Palette,

@@ -1,4 +1,5 @@
-//! Pictures from plain numbers: SVG, its style, axes and charts; pixels and GIF. Nothing here depends on a run or a file.
+//! Pictures from plain numbers: SVG, its style, axes and charts; pixels and GIF. Nothing here depends on a run or a
+//! file.
 
 pub mod axis;
 pub mod chart;

@@ -11,6 +11,8 @@ pub enum Medium {
     /// A screen, light or dark. Title and sentences stand above the panels.
     #[default]
     Screen,
+    /// A page with other pictures: it names once what all have in common, a legend or what was run.
+    Page,
     /// White paper, so many pixels wide. Title and sentences are left to the caption below the picture.
     Paper(f64),
 }
@@ -19,20 +21,20 @@ impl Medium {
     /// Width of a chart, in pixels.
     pub fn width(self) -> f64 {
         match self {
-            Medium::Screen => WIDTH,
+            Medium::Screen | Medium::Page => WIDTH,
             Medium::Paper(width) => width,
         }
     }
 
     /// Whether this is a screen.
     pub fn is_screen(self) -> bool {
-        self == Medium::Screen
+        matches!(self, Medium::Screen | Medium::Page)
     }
 
     /// Most pixels of a name at the left of a panel: those on a screen, and a third of the width on paper.
     pub fn name(self, on_screen: f64) -> f64 {
         match self {
-            Medium::Screen => on_screen,
+            Medium::Screen | Medium::Page => on_screen,
             Medium::Paper(width) => on_screen.min(width / 3.0),
         }
     }

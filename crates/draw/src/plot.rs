@@ -97,14 +97,14 @@ impl Plot {
     /// The text of an SVG file: equal plots give equal bytes.
     pub fn draw(&self, medium: Medium) -> String {
         let (most, least, head) = match medium {
-            Medium::Screen => (MAX_WIDTH, MIN_WIDTH, HEAD),
+            Medium::Screen | Medium::Page => (MAX_WIDTH, MIN_WIDTH, HEAD),
             // Title and sentence belong into the caption.
             Medium::Paper(width) => (width - LEFT - RIGHT, width, RIGHT),
         };
         let frame = Frame::new(&self.panels, most);
         let most_curves = self.panels.iter().map(|panel| panel.curves.len()).max().unwrap_or(0);
         let entries = match medium {
-            Medium::Screen => most_curves,
+            Medium::Screen | Medium::Page => most_curves,
             Medium::Paper(width) => (((width - 2.0 * RIGHT) / ENTRY) as usize).max(1),
         };
         let lines = most_curves.div_ceil(entries.max(1)) as f64;

@@ -6,8 +6,8 @@
 
 use super::medium::Medium;
 
-/// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …; the patterns alone are
-/// `d0`, `d1`, …
+/// Number of colours and dash patterns in [`chart`] that distinguish curves: classes `s0`, `s1`, …; the patterns alone
+/// are `d0`, `d1`, …
 pub const SERIES: usize = 8;
 /// Number of colours in [`chart`] that order curves, from low to high: classes `r0`, `r1`, …
 pub const RAMP: usize = 12;
@@ -84,9 +84,9 @@ const CHART_DARK: &str = "\
 
 /// Rules of all pictures, followed by those of one kind: always, and in dark mode, which paper has not.
 pub fn sheet(medium: Medium, light: &str, dark: &str) -> String {
-    match medium {
-        Medium::Screen => format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n"),
-        Medium::Paper(_) => format!("{LIGHT}{light}"),
+    match medium.is_screen() {
+        true => format!("{LIGHT}{light}@media screen and (prefers-color-scheme: dark) {{\n{DARK}{dark}}}\n"),
+        false => format!("{LIGHT}{light}"),
     }
 }
 

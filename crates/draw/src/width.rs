@@ -67,9 +67,22 @@ pub fn shortened(text: &str, size: f64, most: f64) -> String {
     short.trim_end().to_owned() + "…"
 }
 
-/// Each of `texts` in at most `most` pixels, unless two that differ would then be equal: what all have in common at their
-/// beginning goes first, and if that is not enough, they keep their width.
-pub fn told_apart(texts: &[String], size: f64, most: f64) -> Vec<String> {
+/// `text` in at most `most` pixels, with its beginning and its end: the ends of names may be all that differs.
+pub fn shortened_inside(text: &str, size: f64, most: f64) -> String {
+    if width(text, size) <= most {
+        return text.to_owned();
+    }
+    let all: Vec<char> = text.chars().collect();
+    let of = |kept: usize| -> String {
+        let (start, end) = (kept.div_ceil(2), all.len() - kept / 2);
+        all[..start].iter().chain(&['…']).chain(&all[end..]).collect()
+    };
+    (0..all.len()).rev().map(of).find(|short| width(short, size) <= most).unwrap_or("…".into())
+}
+
+/// Each of `texts` in at most `most` pixels, unless two that differ would then be equal: what all have in common at
+/// their beginning goes first, and if that is not enough, they keep their width.
+pub fn distinct(texts: &[String], size: f64, most: f64) -> Vec<String> {
     let are_distinct = |short: &[String]| {
         let equal = |i: usize, j: usize| short[i] == short[j] && texts[i] != texts[j];
         (0..texts.len()).all(|i| (0..i).all(|j| !equal(i, j)))
@@ -105,19 +118,31 @@ mod tests {
     }
 
     #[test]
+    fn a_text_cut_inside_keeps_both_ends() {
+        let texts = ["a-long-common-beginning-of-islands-1", "a-long-common-beginning-of-islands-2"];
+        let cut = texts.map(|text| shortened_inside(text, SIZE, 120.0));
+        assert!(cut.iter().all(|text| width(text, SIZE) <= 120.0 && text.starts_with("a-long-") && text.contains('…')));
+        assert!(cut[0].ends_with("-1") && cut[1].ends_with("-2"), "{cut:?}");
+        let ends = texts.map(|text| shortened(text, SIZE, 120.0));
+        assert_eq!(ends[0], ends[1], "the control: cut at the end they are equal");
+        assert_eq!(["b", "žé"].map(|text| shortened_inside(text, SIZE, 60.0)), ["b", "žé"]);
+        assert_eq!(shortened_inside("wide", SIZE, 1.0), "…");
+    }
+
+    #[test]
     fn texts_that_differ_stay_different() {
         let texts = |all: &[&str]| all.iter().map(|text| (*text).to_owned()).collect::<Vec<_>>();
         let flows = texts(&["amplitude = 0.02, flow = willmore", "amplitude = 0.02, flow = elastic:0.5"]);
-        let (cut, told) = (shortened(&flows[0], SIZE, 150.0), told_apart(&flows, SIZE, 150.0));
+        let (cut, told) = (shortened(&flows[0], SIZE, 150.0), distinct(&flows, SIZE, 150.0));
         assert_eq!(cut, shortened(&flows[1], SIZE, 150.0), "the control: their beginnings are equal");
         assert_eq!(told, ["…willmore", "…elastic:0.5"]);
-        assert_eq!(told_apart(&texts(&["0.02", "0.1"]), SIZE, 150.0), ["0.02", "0.1"]);
+        assert_eq!(distinct(&texts(&["0.02", "0.1"]), SIZE, 150.0), ["0.02", "0.1"]);
         let alike = texts(&["a long name that differs at its end: 1", "b long name that differs at its end: 2"]);
-        assert_eq!(told_apart(&alike, SIZE, 60.0).len(), 2);
+        assert_eq!(distinct(&alike, SIZE, 60.0).len(), 2);
         let both = texts(&["x, a long name that differs at its end: 1", "x, a long name that differs at its end: 1"]);
-        assert_eq!(told_apart(&both, SIZE, 60.0)[0], told_apart(&both, SIZE, 60.0)[1], "equal ones may be equal");
+        assert_eq!(distinct(&both, SIZE, 60.0)[0], distinct(&both, SIZE, 60.0)[1], "equal ones may be equal");
         let hard = texts(&["a1 and much that is the same 1", "a1 and much that is the same 2", "b1"]);
-        assert_eq!(told_apart(&hard, SIZE, 40.0), hard);
+        assert_eq!(distinct(&hard, SIZE, 40.0), hard);
     }
 
     #[test]

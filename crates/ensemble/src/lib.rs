@@ -13,7 +13,7 @@ pub mod trajectory;
 pub use member::{Family, Member, Mollified, Outlines, Treated, Variation};
 pub use outcome::{
     Ended, Extent, Feature, Features, LevelRow, LevelTimes, Observables, Outcome, Paused, Portrait, RefinementLevel,
-    Rows, SeriesRow, Sink, Snapshot, Standing, Status, Wish,
+    Rows, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Status,
 };
 pub use request::{Drawn, Event, MemberValues, Shard, Spec};
-pub use study::{Cell, Judged, Study};
+pub use study::{Cell, LevelSink, Study};

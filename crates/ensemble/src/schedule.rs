@@ -68,7 +68,8 @@ impl Clock {
     }
 }
 
-/// The split of adaptive time into two parts that both fit the precision, see [`scheme::pace`](curvelax_flow::scheme::pace).
+/// The split of adaptive time into two parts that both fit the precision, see
+/// [`scheme::pace`](curvelax_flow::scheme::pace).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ticks {
     /// Unit of the high part, a power of two.

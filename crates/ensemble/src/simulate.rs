@@ -2,7 +2,7 @@
 //!
 //! Nothing here depends on where the members are advanced or on how many are resident: a member's steps are its
 //! own, it is paused at its output times, and rows are written in member order. A run may therefore be interrupted
-//! between any two dispatches: the [`Standing`] then has all that [`resume`] needs to end it as it would have ended.
+//! between any two dispatches: the [`RunProgress`] then has all that [`resume`] needs to end it as it would have ended.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -12,7 +12,7 @@ use std::{
 };
 
 use crate::{
-    Cell, Ended, Paused, Rows, Sink, Standing, Wish,
+    Cell, Ended, Paused, Rows, RunProgress, Sink, SinkRequest,
     outcome::linear_rate,
     request::spec::Precision,
     schedule::{Outputs, grid},
@@ -55,23 +55,23 @@ pub fn simulate(
     portraits: usize,
     sink: &mut dyn Sink,
 ) -> Result<()> {
-    resume(cells, precision, backend, portraits, Standing::default(), sink)
+    resume(cells, precision, backend, portraits, RunProgress::default(), sink)
 }
 
 /// Like [`simulate`], continuing from the progress of an earlier run of the same cells.
 ///
 /// # Errors
-/// Those of the back end and the sink, and [`Error::Request`] if members in `standing` are not those of `cells`.
+/// Those of the back end and the sink, and [`Error::Request`] if members in `progress` are not those of `cells`.
 pub fn resume(
     cells: &[Cell],
     precision: Precision,
     backend: &mut dyn Backend,
     portraits: usize,
-    standing: Standing,
+    progress: RunProgress,
     sink: &mut dyn Sink,
 ) -> Result<()> {
     let roster = Roster::new(cells, precision, portraits);
-    let mut simulation = Simulation::new(&roster, backend.slots(), backend.batches(), standing)?;
+    let mut simulation = Simulation::new(&roster, backend.slots(), backend.batches(), progress)?;
     let done = loop {
         match simulation.turn(backend, sink) {
             Ok(true) => {}
@@ -116,8 +116,8 @@ impl<'a> Roster<'a> {
 /// Members that wait: their ranks, cells and indices.
 type Waiting<'a> = Peekable<Box<dyn Iterator<Item = (u64, (usize, u64))> + 'a>>;
 
-/// A run in turns, for a caller who has other things to do between them, such as a page in a browser; [`simulate`] takes
-/// one after another.
+/// A run in turns, for a caller who has other things to do between them, such as a page in a browser; [`simulate`]
+/// takes one after another.
 pub struct Simulation<'a> {
     pool: Pool<'a>,
     queue: Queue,
@@ -136,10 +136,10 @@ impl<'a> Simulation<'a> {
     /// Begins a run on a back end of so many slots in so many batches, or continues one.
     ///
     /// # Errors
-    /// [`Error::Request`] if members in `standing` are not those of the roster.
-    pub fn new(roster: &'a Roster<'a>, slots: usize, batches: usize, standing: Standing) -> Result<Simulation<'a>> {
+    /// [`Error::Request`] if members in `progress` are not those of the roster.
+    pub fn new(roster: &'a Roster<'a>, slots: usize, batches: usize, progress: RunProgress) -> Result<Simulation<'a>> {
         let cells = roster.cells;
-        let Standing { next, early, resident } = standing;
+        let RunProgress { next, early, resident } = progress;
         let pool = Pool {
             roster,
             resident: (0..slots).map(|_| None).collect(),
@@ -172,7 +172,7 @@ impl<'a> Simulation<'a> {
         })
     }
 
-    /// Handles a batch, if it is back, and starts it again. Returns whether the run goes on.
+    /// Handles a batch, if it is back, and starts it again. Returns whether the run continues.
     ///
     /// # Errors
     /// Those of the back end and the sink, which end the run.
@@ -194,7 +194,7 @@ impl<'a> Simulation<'a> {
             on_the_way[*batch] = false;
             pool.collect(backend, slots.clone(), queue, sink)?;
         }
-        // The sink must be heard even if members end at once.
+        // The sink must be asked even if members end at once.
         let mut over = 0;
         for slot in slots.clone() {
             while pool.resident[slot].is_none() && over < MAX_AT_ONCE {
@@ -209,16 +209,16 @@ impl<'a> Simulation<'a> {
         if pool.resident.iter().all(Option::is_none) && waiting.peek().is_none() {
             return Ok(false);
         }
-        let wish = sink.wish();
-        let goes_on = matches!(wish, Wish::Continue);
+        let request = sink.next_request();
+        let continues = matches!(request, SinkRequest::Continue);
         // A checkpoint needs all batches back.
-        if !goes_on && !on_the_way.contains(&true) {
+        if !continues && !on_the_way.contains(&true) {
             pool.relieve(queue, MAX_KEPT, sink)?;
             queue.checkpoint(Some(pool.pause(backend)?), sink)?;
-            if let Wish::Stop(error) = wish {
+            if let SinkRequest::Stop(error) = request {
                 return Err(error);
             }
-        } else if !goes_on {
+        } else if !continues {
             *told = *told || queue.checkpoint_before_the_stop(sink)?;
             *batch = (*batch + 1) % on_the_way.len();
             return Ok(true);
@@ -432,16 +432,16 @@ impl Queue {
 
     /// Saves the members that have ended, and the unfinished ones if known.
     fn checkpoint(&mut self, resident: Option<BTreeMap<u64, Paused>>, sink: &mut dyn Sink) -> Result<()> {
-        let standing = Standing { next: self.next, early: std::mem::take(&mut self.early), resident };
-        let done = sink.checkpoint(&standing);
-        self.kept = done.is_ok() && standing.resident.is_some();
-        self.early = standing.early;
+        let progress = RunProgress { next: self.next, early: std::mem::take(&mut self.early), resident };
+        let done = sink.checkpoint(&progress);
+        self.kept = done.is_ok() && progress.resident.is_some();
+        self.early = progress.early;
         done
     }
 
-    /// If the run is to stop, saves at once what is known, since nobody may wait for members in progress.
+    /// If the run is to stop, saves at once what is known, since members in progress may never end.
     fn checkpoint_before_the_stop(&mut self, sink: &mut dyn Sink) -> Result<bool> {
-        let stops = matches!(sink.wish(), Wish::Stop(_));
+        let stops = matches!(sink.next_request(), SinkRequest::Stop(_));
         if stops {
             self.checkpoint(None, sink)?;
         }

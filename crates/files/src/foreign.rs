@@ -19,10 +19,10 @@ use curvelax_base::input;
 
 /// What is in `folder` and in its folders that is not of a run, by its path there, in order.
 ///
-/// Names alone do not tell: `summary.csv` or `run.json` may be anybody's. A checkpoint or the `run.json` of a run speaks for
-/// the files of these names, without a checkpoint only for those that the spec in it asks for; unfinished ones, which are
-/// hidden, speak for themselves. Other hidden files do not count: no
-/// run touches them, and systems leave some in every folder that is looked at.
+/// Names alone do not tell: `summary.csv` or `run.json` may be anybody's. A checkpoint or the `run.json` of a run
+/// speaks for the files of these names, without a checkpoint only for those that the spec in it asks for; unfinished
+/// ones, which are hidden, speak for themselves. Other hidden files do not count: no run touches them, and systems
+/// leave some in every folder that is looked at.
 pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let there = |name: &&str| folder.join(name).symlink_metadata().is_ok();
     let (begun, run) = ([STATE, STATE_OLD].iter().any(there), folder.join(RUN));

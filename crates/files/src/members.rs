@@ -98,7 +98,8 @@ impl MemberReader {
     /// Opens the table at `place`, of a run of `spec`.
     ///
     /// # Errors
-    /// [`Error::Request`](curvelax_base::error::Error::Request) if it does not exist, has other columns, or is truncated.
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if it does not exist, has other columns, or is
+    /// truncated.
     pub fn open(place: &Place, spec: &Spec) -> Result<MemberReader> {
         let features = spec.all_features()?;
         let names = header(&features).map(String::from).collect();

@@ -83,8 +83,8 @@ pub const FIGURES: [&str; 8] =
 /// `.curvelax.rows.part` during a run.
 pub const ROWS: &str = "curvelax.rows";
 
-/// All files that a run may write, or that are made from one without naming a place; the one that vouches for the others
-/// comes first.
+/// All files that a run may write, or that are made from one without naming a place; the one that vouches for the
+/// others comes first.
 pub fn own() -> impl Iterator<Item = &'static str> {
     OWN.into_iter().chain(PARQUET).chain(PAPER)
 }

@@ -47,8 +47,8 @@ pub enum Existing {
     Refused,
     /// Accepted, unless a name in it is needed.
     Filled,
-    /// Accepted; files of an earlier run of the same command are replaced. Commands that also remove such files accept no
-    /// others.
+    /// Accepted; files of an earlier run of the same command are replaced. Commands that also remove such files accept
+    /// no others.
     Replaced,
 }
 
@@ -102,8 +102,8 @@ impl Owner {
 }
 
 impl Existing {
-    /// Refuses the folder at `place`, called `path`, in which `owner` will write files `names`, if something in it would
-    /// be lost.
+    /// Refuses the folder at `place`, called `path`, in which `owner` will write files `names`, if something in it
+    /// would be lost.
     ///
     /// # Errors
     /// [`Error::Request`] naming what is there.

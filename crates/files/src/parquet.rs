@@ -1,8 +1,8 @@
-//! The tables as Parquet, for programs that read columns and their types: made from the CSV files when they are complete,
-//! so that every row has one writer.
+//! The tables as Parquet, for programs that read columns and their types: made from the CSV files when they are
+//! complete, so that every row has one writer.
 //!
-//! Integers are `INT64` and floats `DOUBLE`, both null where the CSV field is empty; words are strings, never null. Equal
-//! tables give equal bytes.
+//! Integers are `INT64` and floats `DOUBLE`, both null where the CSV field is empty; words are strings, never null.
+//! Equal tables give equal bytes.
 
 use std::{io, sync::Arc};
 

@@ -81,7 +81,7 @@ impl PartFolder {
     /// Removes unfinished replacements left by a killed run.
     pub(super) fn sweep(&self) -> Result<()> {
         sweep(self.part.at(), true)
-            .map_err(|e| Error::Request(format!("{}: cannot go on with it ({e})", self.part.shown().display())))
+            .map_err(|e| Error::Request(format!("{}: cannot continue it ({e})", self.part.shown().display())))
     }
 
     /// Sets whether to keep the folder if the run fails.
@@ -231,7 +231,7 @@ mod tests {
             assert!(error.to_string().contains(problem), "{error}");
             assert_eq!(fs::read_to_string(&mine).unwrap(), "mine");
         }
-        // Nobody misses an empty folder.
+        // An empty folder holds nothing to lose.
         let home = tempfile::tempdir().unwrap();
         fs::create_dir(home.path().join(STORE)).unwrap();
         OutputFolder::open(home.path(), true).unwrap();

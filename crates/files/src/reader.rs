@@ -23,7 +23,7 @@ use curvelax_ensemble::{LevelRow, LevelTimes, Outcome, Spec, outcome::linear_rat
 use curvelax_study::results::{
     explained::{Explained, Explaining, FeaturedMember, TIMES},
     provenance::{FORMAT, Provenance, by_status},
-    tally::{Aside, MeanExcess, Tally},
+    tally::{MeanExcess, Tally, TallySupplement},
 };
 
 /// Relative distance behind the end at which a time is still rounding, in f32.
@@ -185,16 +185,21 @@ pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Resu
     Ok(levels)
 }
 
-/// Adds up the rows of a resumed run, and those of its events, with those of its levels, and `aside`.
+/// Adds up the rows of a resumed run, and those of its events, with those of its levels, and `supplement`.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of a run of `spec`.
-pub fn rows(place: (&Place, Option<&Place>), spec: &Spec, levels: &LevelTimes, aside: Aside) -> Result<Tally> {
+pub fn rows(
+    place: (&Place, Option<&Place>),
+    spec: &Spec,
+    levels: &LevelTimes,
+    supplement: TallySupplement,
+) -> Result<Tally> {
     let mut tally = Tally::of(spec, levels);
     let mut rows = Summary::of(place, spec, levels)?;
     rows.try_for_each(|outcome| tally.add(&outcome?))?;
     rows.end()?;
-    tally.set_aside(aside);
+    tally.set_supplement(supplement);
     Ok(tally)
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A float that is not finite is unknown. There are no clock times: equal runs give equal bytes.
 //!
-//! A column is a line of `columns!`. [`Table::row`] writes its field and [`TableReader`](super::TableReader) reads it; how
-//! is in `column.rs`, by kind.
+//! A column is a line of `columns!`. [`Table::row`] writes its field and [`TableReader`](super::TableReader) reads it;
+//! how is in `column.rs`, by kind.
 
 use std::marker::PhantomData;
 
@@ -510,7 +510,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_table_goes_on_after_its_mark_and_is_kept_as_it_is_told() {
+    fn a_table_continues_after_its_mark_and_is_written_as_requested() {
         let home = tempfile::tempdir().unwrap();
         let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
         let one = outcome(observables(), observables());

@@ -4,8 +4,8 @@
 //! β = -∂_s( M(ψ) ∂_s( (γ + γ″)(ψ) k ) ),    ψ the angle of the outward normal of a counter-clockwise curve
 //! ```
 //!
-//! Both functions are 1 plus at most [`MOST_WAVES`] waves `ε cos m(ψ - ψ₀)`. The energy is `∮γ ds`. At rest the curve is
-//! the Wulff shape of γ, with the support function γ/c for a scale c, the curvature c/(γ + γ″) and the area |W|/c².
+//! Both functions are 1 plus at most [`MOST_WAVES`] waves `ε cos m(ψ - ψ₀)`. The energy is `∮γ ds`. At rest the curve
+//! is the Wulff shape of γ, with the support function γ/c for a scale c, the curvature c/(γ + γ″) and the area |W|/c².
 
 use std::{
     f64::consts::{FRAC_PI_2, PI, TAU},
@@ -73,8 +73,8 @@ impl Waves {
         self.0.iter().flatten()
     }
 
-    /// Returns the waves that do something as `[m, a, b]`: `a Re z + b Im z`, with z the m-th power of the unit tangent,
-    /// which the normal follows by a quarter of a turn. Others are 0.
+    /// Returns the waves that do something as `[m, a, b]`: `a Re z + b Im z`, with z the m-th power of the unit
+    /// tangent, which the normal follows by a quarter of a turn. Others are 0.
     pub fn numbers(&self) -> [[f64; WAVE]; MOST_WAVES] {
         let mut numbers = [[0.0; WAVE]; MOST_WAVES];
         let waves = self.iter().filter(|wave| wave.strength != 0.0);
@@ -180,18 +180,7 @@ macro_rules! function {
             }
         }
 
-        impl From<$name> for String {
-            fn from(function: $name) -> String {
-                function.to_string()
-            }
-        }
-
-        impl TryFrom<String> for $name {
-            type Error = String;
-            fn try_from(text: String) -> Result<$name, String> {
-                text.parse()
-            }
-        }
+        curvelax_base::as_text!($name);
 
         impl $name {
             /// Returns its waves.
@@ -249,8 +238,8 @@ impl FromStr for Diffusivity {
 }
 
 impl Energy {
-    /// Returns 1 - min(γ + γ″): 0 for an isotropic energy, `|ε|(m² - 1)` for one wave, and 1 where the equation ceases to
-    /// be parabolic.
+    /// Returns 1 - min(γ + γ″): 0 for an isotropic energy, `|ε|(m² - 1)` for one wave, and 1 where the equation ceases
+    /// to be parabolic.
     pub fn anisotropy(&self) -> f64 {
         let factor = |wave: &Wave| f64::from(wave.mode * wave.mode) - 1.0;
         match self.0.0 {
@@ -330,11 +319,11 @@ impl Energy {
 }
 
 impl Crystal {
-    /// Returns the two slowest rates at which small perturbations of the Wulff shape decay, over those of a circle of the same
-    /// area, both 12/R⁴.
+    /// Returns the two slowest rates at which small perturbations of the Wulff shape decay, over those of a circle of
+    /// the same area, both 12/R⁴.
     ///
-    /// A perturbation ρ(ψ) of the support function moves by `-(c⁴/g) ∂( (M/g) ∂( (ρ + ρ″)/g ) )`, g = γ + γ″. This has the
-    /// eigenvalues of the symmetric `c⁴ S G (∂² + 1) G Sᵀ` with G = 1/g and S = √(M/g) ∂, here with trigonometric
+    /// A perturbation ρ(ψ) of the support function moves by `-(c⁴/g) ∂( (M/g) ∂( (ρ + ρ″)/g ) )`, g = γ + γ″. This has
+    /// the eigenvalues of the symmetric `c⁴ S G (∂² + 1) G Sᵀ` with G = 1/g and S = √(M/g) ∂, here with trigonometric
     /// differences. Three are 0: two translations and the area.
     pub fn slowest_rates(&self) -> [f64; 2] {
         let n = MODES;

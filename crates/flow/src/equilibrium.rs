@@ -35,7 +35,8 @@ impl Equilibrium {
         }
     }
 
-    /// Returns `E²/(4|W|A)` of a curve of surface energy E, which is the length L of isotropic curves: least at equilibrium.
+    /// Returns `E²/(4|W|A)` of a curve of surface energy E, which is the length L of isotropic curves: least at
+    /// equilibrium.
     pub fn quotient(self, tension: f64, area: f64) -> f64 {
         tension * tension / (4.0 * self.area() * area)
     }
@@ -43,7 +44,7 @@ impl Equilibrium {
     /// Returns that of n ≥ 3 nodes at equilibrium: `(n/π)·tan(π/n)` of the regular n-gon; of a Wulff shape with evenly
     /// spaced nodes.
     ///
-    /// The quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 for ever.
+    /// The quotient alone would leave a relaxed polygon 1 + π²/(3n²) above a circle's 1 permanently.
     pub fn least_quotient(self, n: usize) -> f64 {
         match self {
             Equilibrium::Circle => {

@@ -46,8 +46,8 @@ pub enum Flow {
     Elastic(f64),
     /// `b = c₁k + c₂k² + …`, coefficients from the first power on, at most [`MAX_DEGREE`].
     Polynomial(Vec<f64>),
-    /// Surface diffusion of a material whose energy and mobility depend on the direction. It has no name of its own: both
-    /// functions are keys.
+    /// Surface diffusion of a material whose energy and mobility depend on the direction. It has no name of its own:
+    /// both functions are keys.
     Crystal(Crystal),
 }
 
@@ -74,9 +74,9 @@ impl Flow {
         if let Flow::Elastic(lambda) = self { *lambda } else { 0.0 }
     }
 
-    /// Returns the numbers by which [forces](crate::scheme::forces) know the law, for lengths in units of `unit` and times
-    /// in units of its fourth power: `c₁ … c_8`, of dimension length^(j-3), and λ of the energy, of dimension 1/length²;
-    /// what else there is has a constant with its place. The rest is 0.
+    /// Returns the numbers by which [forces](crate::scheme::forces) know the law, for lengths in units of `unit` and
+    /// times in units of its fourth power: `c₁ … c_8`, of dimension length^(j-3), and λ of the energy, of dimension
+    /// 1/length²; what else there is has a constant with its place. The rest is 0.
     pub fn law(&self, unit: f64) -> [f64; LAW] {
         let mut law = [0.0; LAW];
         for (j, (to, c)) in (1..).zip(law.iter_mut().zip(self.coefficients())) {
@@ -111,8 +111,9 @@ impl Flow {
         self.coefficients().iter().rev().fold(0.0, |sum, c| (sum + c) * k)
     }
 
-    /// Linear decay rate of mode `m` on a circle of radius `radius`: `(m²-1)·(m²/R⁴ + b'(1/R)/R²)`, in 1/time. Of a crystal,
-    /// whose modes are others: in proportion to the slowest rate at the Wulff shape of the same area, which is that of m = 2.
+    /// Linear decay rate of mode `m` on a circle of radius `radius`: `(m²-1)·(m²/R⁴ + b'(1/R)/R²)`, in 1/time. Of a
+    /// crystal, whose modes are others: in proportion to the slowest rate at the Wulff shape of the same area, which is
+    /// that of m = 2.
     pub fn linear_rate(&self, m: u32, radius: f64) -> f64 {
         let m2 = f64::from(m * m);
         if let Flow::Crystal(crystal) = self {
@@ -134,8 +135,9 @@ impl Flow {
 
     /// Rate at which the excess of a nearly round curve of area `area` falls in mode `m`, by linear theory, in 1/time:
     /// `24/R⁴` for m = 2 and surface diffusion; for Willmore flow the exponent of `1 + 2t/R₀⁴`. `None` if the
-    /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow. Of a
-    /// crystal for m = 2 the mean of the two slowest rates, if they are nearly equal: otherwise it depends on the direction.
+    /// radius of a circle changes in another way: see `crates/ensemble/src/outcome/linear_rate.rs` for elastic flow. Of
+    /// a crystal for m = 2 the mean of the two slowest rates, if they are nearly equal: otherwise it depends on the
+    /// direction.
     pub fn excess_rate(&self, m: u32, area: f64) -> Option<f64> {
         let radius = (area.abs() / PI).sqrt();
         match self {
@@ -166,18 +168,7 @@ impl fmt::Display for Flow {
     }
 }
 
-impl From<Flow> for String {
-    fn from(flow: Flow) -> String {
-        flow.to_string()
-    }
-}
-
-impl TryFrom<String> for Flow {
-    type Error = String;
-    fn try_from(text: String) -> Result<Flow, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Flow);
 
 impl FromStr for Flow {
     type Err = String;

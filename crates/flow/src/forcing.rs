@@ -74,8 +74,8 @@ pub struct Forcing {
 }
 
 impl Forcing {
-    /// Writes it into the numbers of a [law](crate::flow::Flow::law), for lengths in units of `unit` and times in units of its
-    /// fourth power.
+    /// Writes it into the numbers of a [law](crate::flow::Flow::law), for lengths in units of `unit` and times in units
+    /// of its fourth power.
     pub fn write(&self, law: &mut [f64; LAW], unit: f64) {
         match self.drive {
             None => {}
@@ -100,7 +100,7 @@ impl Forcing {
 
 /// What theory says of a nearly round curve.
 impl Forcing {
-    /// Returns whether anything acts beside the flow.
+    /// Returns whether anything acts besides the flow.
     pub fn acts(&self) -> bool {
         self.drive.is_some() || self.conserved.is_some()
     }
@@ -112,8 +112,8 @@ impl Forcing {
         Forcing { kept: [or_start(area, start[0]), or_start(length, start[1])], ..self }
     }
 
-    /// Returns the radius of the circle at which a curve comes to rest, if that follows from what is kept: by those of the
-    /// circles of its area and of its length.
+    /// Returns the radius of the circle at which a curve comes to rest, if that follows from what is kept: by those of
+    /// the circles of its area and of its length.
     pub fn radius_at_rest(&self, of_area: f64, of_length: f64) -> Option<f64> {
         let [area, length] = self.kept;
         match self.conserved? {
@@ -132,8 +132,8 @@ impl Forcing {
         }
     }
 
-    /// Returns the [rate](Flow::linear_rate) at which mode `m` of a circle decays. A force that is the same everywhere has no
-    /// part in it, nor has p. The λ that keeps the length of a circle, `b(1/R) + λ/R = 0`, adds `λ(m²-1)/R²`.
+    /// Returns the [rate](Flow::linear_rate) at which mode `m` of a circle decays. A force that is the same everywhere
+    /// has no part in it, nor has p. The λ that keeps the length of a circle, `b(1/R) + λ/R = 0`, adds `λ(m²-1)/R²`.
     pub fn linear_rate(&self, flow: &Flow, m: u32, radius: f64) -> f64 {
         let free = flow.linear_rate(m, radius);
         match self.conserved {
@@ -238,26 +238,7 @@ impl FromStr for Conserved {
     }
 }
 
-macro_rules! as_text {
-    ($($name:ident)*) => {
-        $(
-            impl From<$name> for String {
-                fn from(value: $name) -> String {
-                    value.to_string()
-                }
-            }
-
-            impl TryFrom<String> for $name {
-                type Error = String;
-                fn try_from(text: String) -> Result<$name, String> {
-                    text.parse()
-                }
-            }
-        )*
-    };
-}
-
-as_text!(Drive Conserved);
+curvelax_base::as_text!(Drive Conserved);
 
 #[cfg(test)]
 mod tests {

@@ -1,5 +1,6 @@
 //! The semi-implicit Lagrangian scheme of K. Mikula and D. Ševčovič, *Numerical aspects of evolution of plane curves
-//! satisfying the fourth order geometric equation*: one member, in any number type and in lanes, without files or threads.
+//! satisfying the fourth order geometric equation*: one member, in any number type and in lanes, without files or
+//! threads.
 //!
 //! | module | holds |
 //! |---|---|

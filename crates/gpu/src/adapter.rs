@@ -24,7 +24,7 @@ use curvelax_flow::{number::Real, solver::Blocks};
 
 /// Time after which a driver that is still compiling is reported.
 const LONG: Duration = Duration::from_secs(5);
-/// Time between two questions whether to go on.
+/// Time between two checks whether to continue.
 const PERIOD: Duration = Duration::from_millis(100);
 
 /// An adapter that could run the kernel.
@@ -161,19 +161,20 @@ impl Gpu {
     }
 
     /// Opens the device and compiles the pipeline for [`pipeline`](Gpu::pipeline); calls `tell` if that takes long, and
-    /// `go_on` several times a second, whose error ends the wait.
+    /// `may_continue` several times a second, whose error ends the wait.
     ///
     /// Nothing can stop a driver's compiler. It therefore runs in a thread, which is abandoned after the `limit`.
     ///
     /// # Errors
-    /// [`Error::Device`] if the adapter cannot be opened, the driver panics or the limit is over, and that of `go_on`.
+    /// [`Error::Device`] if the adapter cannot be opened, the driver panics or the limit is over, and that of
+    /// `may_continue`.
     pub fn compile<T: Real>(
         self: &Arc<Self>,
         blocks: Blocks,
         variant: Variant,
         limit: Option<Duration>,
         tell: &dyn Fn(),
-        go_on: &dyn Fn() -> Result<()>,
+        may_continue: &dyn Fn() -> Result<()>,
     ) -> Result<()> {
         let (send, compiled) = channel();
         let gpu = Arc::clone(self);
@@ -194,7 +195,7 @@ impl Gpu {
             if !is_late || limit.is_some_and(|limit| begun.elapsed() >= limit) {
                 break done;
             }
-            go_on().inspect_err(|_| abandoned::abandon(Arc::clone(self)))?;
+            may_continue().inspect_err(|_| abandoned::abandon(Arc::clone(self)))?;
         };
         let fault = match done {
             Ok(Ok(done)) => return done,
@@ -236,7 +237,7 @@ impl Gpu {
             set(&at, &|first| first.unwrap_or_else(|| one_line(&error.to_string())));
         }));
         let at = fault.clone();
-        // Dropping the device also calls back, but then nobody is listening.
+        // Dropping the device also calls back, but then no receiver is left.
         device.set_device_lost_callback(move |reason, message| {
             set(&at, &|_| one_line(&format!("the device was lost ({reason:?}) {message}")));
         });
@@ -251,7 +252,7 @@ pub(super) enum Waited {
     /// The work is done.
     Done,
     /// The work is still in progress.
-    OnItsWay,
+    Pending,
 }
 
 impl OpenGpu {
@@ -293,7 +294,7 @@ impl OpenGpu {
         self.check()?;
         match polled {
             Ok(_) => Ok(Waited::Done),
-            Err(wgpu::PollError::Timeout) => Ok(Waited::OnItsWay),
+            Err(wgpu::PollError::Timeout) => Ok(Waited::Pending),
             Err(error) => Err(self.error(&format!("a dispatch was not taken ({error})"))),
         }
     }

@@ -118,7 +118,7 @@ impl<T: Real> Batch<T> {
     /// a fault, which `finish` reports.
     pub fn is_back(&self, device: &OpenGpu, most: Duration) -> bool {
         let Some(Flight { back, .. }) = &self.flight else { return true };
-        !matches!(device.wait(&back.submission, most), Ok(Waited::OnItsWay))
+        !matches!(device.wait(&back.submission, most), Ok(Waited::Pending))
     }
 
     /// Waits for the dispatch while it has time `left`, and reads its records; returns when it was started.
@@ -155,7 +155,7 @@ impl Reading {
 
     /// Waits for the copy, in progress `since` then, while there is time `left`.
     pub fn wait(self, device: &OpenGpu, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
-        while device.wait(&self.submission, left(since))? == Waited::OnItsWay {
+        while device.wait(&self.submission, left(since))? == Waited::Pending {
             if left(since).is_zero() {
                 let seconds = since.elapsed().as_secs_f64();
                 // To release a device, wgpu waits until it is idle.

@@ -6,12 +6,12 @@ use curvelax_base::error::{Error, Result};
 
 /// The variable that names another number of seconds.
 const VARIABLE: &str = "CURVELAX_GPU_PATIENCE";
-/// Drivers of hardware abandon a dispatch after some seconds themselves, and compile a kernel in seconds, or in a minute on
-/// a busy machine. A dispatch on lavapipe lasts a fraction of a second, or longer while the driver compiles.
+/// Drivers of hardware abandon a dispatch after some seconds themselves, and compile a kernel in seconds, or in a
+/// minute on a busy machine. A dispatch on lavapipe lasts a fraction of a second, or longer while the driver compiles.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// Time after which a dispatch is abandoned, and the compilation of a kernel if the CPU may take over: two minutes, or the
-/// seconds in `CURVELAX_GPU_PATIENCE`.
+/// Time after which a dispatch is abandoned, and the compilation of a kernel if the CPU may take over: two minutes, or
+/// the seconds in `CURVELAX_GPU_PATIENCE`.
 ///
 /// # Errors
 /// [`Error::Request`] if these are no positive number.

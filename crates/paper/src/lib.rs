@@ -1,7 +1,7 @@
 //! Pictures for papers: the SVG of this program as PNG and PDF, at the width of a journal's column.
 //!
-//! usvg reads a picture, tiny-skia makes pixels of its paths, and pdf-writer a PDF. All text is in a font that is compiled in,
-//! so that the same picture is the same on every machine.
+//! usvg reads a picture, tiny-skia makes pixels of its paths, and pdf-writer a PDF. All text is in a font that is
+//! compiled in, so that the same picture is the same on every machine.
 
 mod pdf;
 mod pixels;
@@ -201,7 +201,7 @@ fn missing_in(group: &Group, letters: &mut BTreeSet<char>) {
 }
 
 /// What is said of letters that the font lacks; nothing if there are none.
-pub fn told(missing: &BTreeSet<char>) -> Option<String> {
+pub fn missing_letters(missing: &BTreeSet<char>) -> Option<String> {
     let shown: String = missing.iter().take(20).collect();
     let number = count(missing.len() as u64, "letter");
     (!missing.is_empty()).then(|| format!("{number} not in the font of png and pdf, drawn as empty boxes: {shown}"))

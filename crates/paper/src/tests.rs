@@ -52,11 +52,11 @@ fn pixels_are_those_of_the_width_at_the_density_which_the_file_tells() {
 }
 
 #[test]
-fn letters_are_drawn_and_those_that_the_font_lacks_are_told() {
+fn letters_are_drawn_and_those_that_the_font_lacks_are_listed() {
     let dark = |text: &str| {
         let print = written(text, PaperWidth::default());
         let png = print.file(PaperFormat::png(300).unwrap()).unwrap();
-        (pixels(&png).iter().filter(|byte| **byte < 128).count(), told(&print.missing()))
+        (pixels(&png).iter().filter(|byte| **byte < 128).count(), missing_letters(&print.missing()))
     };
     assert_eq!(dark(" "), (0, None), "the control");
     // What labels of this program have, and names of places.

@@ -6,8 +6,8 @@ use curvelax_base::error::{Error, Result, did_you_mean};
 
 use super::{MM_PER_INCH, POINTS_PER_INCH};
 
-/// Names of widths, and these in mm: what Elsevier, Springer, APS and IEEE have for columns is 84 to 90 mm, for pages 170 to
-/// 190 mm.
+/// Names of widths, and these in mm: what Elsevier, Springer, APS and IEEE have for columns is 84 to 90 mm, for pages
+/// 170 to 190 mm.
 const NAMED: [(&str, f64); 2] = [("column", 85.0), ("page", 170.0)];
 /// Widths that are accepted, in mm: charts need room for their labels.
 pub const MM: [f64; 2] = [80.0, 300.0];

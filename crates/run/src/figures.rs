@@ -7,8 +7,8 @@
 //! run fails at once.
 //!
 //! The systems are [solved directly](Solver::Direct); the paper uses Gauss–Seidel. Sweeps converge to the solution that
-//! a direct solver returns at once, so the figures are the limit of infinitely many sweeps. `tests/it/figures.rs` bounds
-//! the distance to sweeps of the default tolerance.
+//! a direct solver returns at once, so the figures are the limit of infinitely many sweeps. `tests/it/figures.rs`
+//! bounds the distance to sweeps of the default tolerance.
 
 use crate::report::progress::Progress;
 use curvelax_base::error::{Error, Result};

@@ -31,7 +31,7 @@ use super::{
 /// Parts of a cross-validation.
 pub const FOLDS: usize = 5;
 /// Maximum features of a regression.
-pub const MOST_FEATURES: usize = 4;
+pub const MAX_FEATURES: usize = 4;
 /// What a further feature must add to the cross-validated R².
 pub const GAIN: f64 = 1e-3;
 /// Minimum members for each feature of a regression.
@@ -108,7 +108,7 @@ impl Regression {
             })
             .collect();
         let least = rest.iter().map(|rest| rest.members() as usize).min()?;
-        let most = (least / MEMBERS_PER_FEATURE).min(MOST_FEATURES).min(places.len());
+        let most = (least / MEMBERS_PER_FEATURE).min(MAX_FEATURES).min(places.len());
         let paths: Vec<Vec<usize>> = rest.iter().map(|rest| rest.forward(most)).collect();
         let cross_validated = |count: usize| {
             let residuals = parts.iter().zip(&rest).zip(&paths).map(|((part, rest), path)| {

@@ -2,19 +2,19 @@
 //!
 //! # Theory
 //!
-//! Of n independent times the number B up to the quantile of p is binomial with n and p. The times of ranks l and u thus
-//! hold it with the probability P(l ≤ B < u): the sign test (W. R. Thompson, *Ann. Math. Stat.* 7, 1936, 122). l is the
-//! largest and u the smallest rank that leave at most 2.5 % on their side, so at least 95 % are covered. Where no rank is
-//! that sure, the interval is open on this side. Where it would be open on both, as for the median of fewer than 6 times,
-//! it is the range of all, which covers 1 - pⁿ - (1-p)ⁿ: of the median 1 - 2^(1-n).
+//! Of n independent times the number B up to the quantile of p is binomial with n and p. The times of ranks l and u
+//! thus hold it with the probability P(l ≤ B < u): the sign test (W. R. Thompson, *Ann. Math. Stat.* 7, 1936, 122). l
+//! is the largest and u the smallest rank that leave at most 2.5 % on their side, so at least 95 % are covered. Where
+//! no rank is that sure, the interval is open on this side. Where it would be open on both, as for the median of fewer
+//! than 6 times, it is the range of all, which covers 1 - pⁿ - (1-p)ⁿ: of the median 1 - 2^(1-n).
 //!
-//! Where members are censored before rank u, the share S that has no event yet is bounded by the beta product (M. P. Fay,
-//! E. H. Brittain and M. A. Proschan, *Biostatistics* 14, 2013, 723). At an event with Y members at risk, S falls by a
-//! factor with the law Beta(Y, 1). So S is distributed as the product of these factors just after an event, and at most
-//! by one more, with the members then at risk, before the next. As in their paper each product is replaced by the beta
-//! law of its mean and variance. Ends are where its quantiles of 2.5 and 97.5 % come down to 1 - p. Without censoring the
-//! product telescopes to the law of the sign test. The interval of R. Brookmeyer and J. Crowley (*Biometrics* 38, 1982,
-//! 29) takes S as normal and covers too little for few members.
+//! Where members are censored before rank u, the share S that has no event yet is bounded by the beta product (M. P.
+//! Fay, E. H. Brittain and M. A. Proschan, *Biostatistics* 14, 2013, 723). At an event with Y members at risk, S falls
+//! by a factor with the law Beta(Y, 1). So S is distributed as the product of these factors just after an event, and at
+//! most by one more, with the members then at risk, before the next. As in their paper each product is replaced by the
+//! beta law of its mean and variance. Ends are where its quantiles of 2.5 and 97.5 % come down to 1 - p. Without
+//! censoring the product telescopes to the law of the sign test. The interval of R. Brookmeyer and J. Crowley
+//! (*Biometrics* 38, 1982, 29) takes S as normal and covers too little for few members.
 
 use super::{
     Description,
@@ -29,8 +29,8 @@ const TAIL: f64 = 0.5 * (1.0 - COVERAGE);
 /// Standard deviations beyond which a share of less than [`TAIL`] lies, whatever the law (Cantelli's inequality).
 const FAR: f64 = 6.25;
 
-/// Returns the interval of the quantile of `p` ∈ (0, 1) of some times; `None` below two members, for any other p, and if
-/// nothing is known of either end.
+/// Returns the interval of the quantile of `p` ∈ (0, 1) of some times; `None` below two members, for any other p, and
+/// if nothing is known of either end.
 pub fn of_sample(sample: &Sample, p: f64) -> Option<Interval> {
     let n = sample.len();
     let ranks = Ranks::new(n, p)?;
@@ -372,7 +372,7 @@ mod tests {
         // One end with 1/32 on its side is surer than 95 %.
         let five = of_sample(&cut(&[(0.2, true), (0.3, true), (0.4, true), (0.5, false), (0.5, false)]), 0.5).unwrap();
         assert_eq!((five.lower, five.upper, five.coverage, five.range_of), (Some(0.2), None, 31.0 / 32.0, None));
-        // Nobody relaxed, and still the median is not before.
+        // No member relaxed, and still the median is not before.
         let none = of_sample(&cut(&[(0.7, false); 6]), 0.5).unwrap();
         assert_eq!((none.lower, none.upper, none.range_of), (Some(0.7), None, None));
         for sample in [cut(&[]), cut(&[(1.0, true)])] {

@@ -12,11 +12,12 @@
 //! ```
 //!
 //! with d_i events at the time t_i among the n_i members still at risk, and M. Greenwood's variance (1926). Quantiles
-//! are read off S, and the median is the middle of the times at which S is ½; the mean is the area under it, and if S does not come down to 0, only the area up to the largest
-//! time: a lower bound. The log-rank test (N. Mantel, *Cancer Chemother. Rep.* 50, 1966, 163) compares the events of
-//! each group with those expected if all groups had one S. The intervals of quantiles are those of the sign test, and of the
-//! beta product where members are censored: they cover at least 95 % for any distribution, or say what they cover.
-//! [`PairedDifferences`] of two groups whose members share their random numbers are tested by F. Wilcoxon's signed ranks.
+//! are read off S, and the median is the middle of the times at which S is ½; the mean is the area under it, and if S
+//! does not come down to 0, only the area up to the largest time: a lower bound. The log-rank test (N. Mantel, *Cancer
+//! Chemother. Rep.* 50, 1966, 163) compares the events of each group with those expected if all groups had one S. The
+//! intervals of quantiles are those of the sign test, and of the beta product where members are censored: they cover at
+//! least 95 % for any distribution, or say what they cover. [`PairedDifferences`] of two groups whose members share
+//! their random numbers are tested by F. Wilcoxon's signed ranks.
 //!
 //! All of this requires that censoring says nothing about the hidden time. This holds for the end of the run, but not
 //! for a member that became singular; the caller must decide, and report, how to treat such members.

@@ -1,18 +1,18 @@
 //! The limit of a time as the resolution grows without bound, and its error.
 //!
-//! With h = 1/n, t(n) = t + a h² + b h⁴ + c h⁶ + …, and three resolutions remove a and b. What is left goes with c, which
-//! they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor ρ by which
-//! terms fall. That is about the square of the angle by which the tangent turns at a node, θ: for a smooth curve it goes
-//! with h, and where θ is not small, n nodes do not resolve the curve, whatever the differences of the times say. A weak
-//! mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. ρ is therefore the larger of θ²
-//! and a multiple of the ratio of the two terms. From the term in h⁴ what is left is about `ρ·|term in h⁴|`, from that in
-//! h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance.
+//! With h = 1/n, t(n) = t + a h² + b h⁴ + c h⁶ + …, and three resolutions remove a and b. What is left goes with c,
+//! which they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor ρ
+//! by which terms fall. That is about the square of the angle by which the tangent turns at a node, θ: for a smooth
+//! curve it goes with h, and where θ is not small, n nodes do not resolve the curve, whatever the differences of the
+//! times say. A weak mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. ρ is
+//! therefore the larger of θ² and a multiple of the ratio of the two terms. From the term in h⁴ what is left is about
+//! `ρ·|term in h⁴|`, from that in h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance.
 //!
-//! The steps in time leave a part that goes with their tolerance, so a ninth of what ten times more exact steps change is
-//! what these leave themselves. It is removed. What remains goes with that change, or with the tolerance over the amplitude
-//! of the shape at that time, which is the root of its excess. The parts of space and of steps are independent and add as
-//! squares. The constants were fitted to ensembles of curves and flows whose limits are known from more nodes and steps
-//! (`docs/internals/method.md#limit`).
+//! The steps in time leave a part that goes with their tolerance, so a ninth of what ten times more exact steps change
+//! is what these leave themselves. It is removed. What remains goes with that change, or with the tolerance over the
+//! amplitude of the shape at that time, which is the root of its excess. The parts of space and of steps are
+//! independent and add as squares. The constants were fitted to ensembles of curves and flows whose limits are known
+//! from more nodes and steps (`docs/internals/method.md#limit`).
 
 use serde::{Deserialize, Serialize};
 
@@ -30,18 +30,18 @@ const OF_OPEN: f64 = 1.25;
 const OF_NOISE: f64 = 2.0;
 /// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
 const OF_FALL: f64 = 1.5;
-/// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units of
-/// the largest difference.
+/// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units
+/// of the largest difference.
 const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
 const OF_DIFFERENCES: f64 = 1.5;
-/// By how much an error may fall from one level to the next, which has √2 times the nodes. Errors fall as h⁶, by 8; those of
-/// levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
+/// By how much an error may fall from one level to the next, which has √2 times the nodes. Errors fall as h⁶, by 8;
+/// those of levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
 const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
 /// How much more exact the steps of the levels are than those of the member.
 pub const FINER_STEPS: f64 = 10.0;
-/// The error of steps: as a share of what these change, and in units of their tolerance over the root of the excess, relative
-/// to the time, since the change may be small by chance.
+/// The error of steps: as a share of what these change, and in units of their tolerance over the root of the excess,
+/// relative to the time, since the change may be small by chance.
 const OF_STEPS: f64 = 0.15;
 const OF_TOLERANCE: f64 = 0.0045;
 /// Orders that are looked for.
@@ -51,8 +51,8 @@ const HALVINGS: usize = 60;
 
 /// Relative error above which a time that is not asymptotic is worth more nodes.
 const WIDE: f64 = 1e-3;
-/// Turn of the tangent at a node above which no bound is believed, and above [`MAX_TURN`] none without an order: three times
-/// may agree by chance.
+/// Turn of the tangent at a node above which no bound is believed, and above [`MAX_TURN`] none without an order: three
+/// times may agree by chance.
 const BLIND_TURN: f64 = 0.7;
 
 /// One time, computed at several resolutions.
@@ -89,8 +89,8 @@ pub struct Limit {
     pub fixed: f64,
     /// Observed order in 1/n, if the differences have one.
     pub order: Option<f64>,
-    /// Whether the nodes resolve the curve and the differences fall as they should; if not, the term in h² alone is removed,
-    /// and the error is a bound.
+    /// Whether the nodes resolve the curve and the differences fall as they should; if not, the term in h² alone is
+    /// removed, and the error is a bound.
     pub asymptotic: bool,
     /// Relative error of the time that is judged, with its sign.
     pub relative: f64,
@@ -198,7 +198,8 @@ impl OfSpace {
     }
 }
 
-/// What follows the terms in h² and h⁴, each `fall` times the one before, or what these two show if they fall more slowly.
+/// What follows the terms in h² and h⁴, each `fall` times the one before, or what these two show if they fall more
+/// slowly.
 fn remainder([second, fourth]: [f64; 2], fall: f64) -> f64 {
     let fall = if OF_FALL * fourth > fall * second { (OF_FALL * fourth / second).min(1.0) } else { fall };
     fall * (fourth + fall * second)

@@ -7,7 +7,7 @@
 //! E W⁺ = ½ Σ r_i,    var W⁺ = ¼ Σ r_i²
 //! ```
 //!
-//! Equal sizes share the mean of their ranks. Up to [`MOST_EXACT`] differences the distribution is counted, ties
+//! Equal sizes share the mean of their ranks. Up to [`MAX_EXACT`] differences the distribution is counted, ties
 //! included, since twice a rank is a whole number. For more it is normal, with a continuity correction of ½.
 
 use super::{
@@ -17,7 +17,7 @@ use super::{
 use curvelax_base::error::{Error, Result};
 
 /// Maximum number of differences for which all signs are counted: 2⁵⁰ is exact in f64.
-const MOST_EXACT: usize = 50;
+const MAX_EXACT: usize = 50;
 
 /// Differences of pairs, sorted.
 #[derive(Clone, Debug, PartialEq)]
@@ -75,8 +75,8 @@ impl PairedDifferences {
         super::describe::quantile(&self.sorted, 0.5)
     }
 
-    /// Returns the 95 % interval of the median, by the ranks of the sign test. `None` below 6 pairs, for which none is that
-    /// sure, and if all differences are equal, which are no draws.
+    /// Returns the 95 % interval of the median, by the ranks of the sign test. `None` below 6 pairs, for which none is
+    /// that sure, and if all differences are equal, which are no draws.
     pub fn interval(&self) -> Option<(f64, f64)> {
         let Ranks { lower, upper, .. } = Ranks::new(self.count(), 0.5)?;
         self.test?;
@@ -103,11 +103,11 @@ fn signed_rank(by_size: &[f64]) -> Option<SignedRank> {
         before += count;
         squares += count * rank * rank;
         positive += rank * tied.iter().filter(|difference| **difference > 0.0).count() as f64;
-        if by_size.len() <= MOST_EXACT {
+        if by_size.len() <= MAX_EXACT {
             doubled.extend(tied.iter().map(|_| rank as usize));
         }
     }
-    let exact = by_size.len() <= MOST_EXACT;
+    let exact = by_size.len() <= MAX_EXACT;
     let p_value = if exact {
         counted(&doubled, positive as usize)
     } else {

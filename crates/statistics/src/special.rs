@@ -23,8 +23,8 @@ pub fn normal_tails(z: f64) -> f64 {
     libm::erfc(z.abs() / std::f64::consts::SQRT_2).max(LEAST)
 }
 
-/// Returns P(X ≤ x) for X with the law Beta(a, b), a > 0, b > 0; for whole numbers that of at most b - 1 successes among
-/// a + b - 1 draws with the probability 1 - x.
+/// Returns P(X ≤ x) for X with the law Beta(a, b), a > 0, b > 0; for whole numbers that of at most b - 1 successes
+/// among a + b - 1 draws with the probability 1 - x.
 ///
 /// The relative error is below 1e-12 for a + b up to 1000, and grows in proportion beyond.
 pub fn beta_share(x: f64, a: f64, b: f64) -> f64 {

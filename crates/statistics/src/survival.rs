@@ -112,7 +112,8 @@ impl<'a> KaplanMeier<'a> {
         self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
-    /// Returns the [quantiles](KaplanMeier::quantile) of ascending fractions, in one pass, up to the first that is unknown.
+    /// Returns the [quantiles](KaplanMeier::quantile) of ascending fractions, in one pass, up to the first that is
+    /// unknown.
     pub fn quantiles(&self, ascending: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let mut steps = self.steps().peekable();
         let quantile = |p: f64| {

@@ -1,10 +1,11 @@
 //! `--accuracy`: the number of nodes, the tolerance and the number of members that reach a given uncertainty, found in
 //! rounds.
 //!
-//! A round runs the study, without its shards, in memory and on the CPU, so that the choice is the same on every machine.
-//! The uncertainty of a median has two parts: sampling falls like 1/√members, discretisation with n. First rounds find n
-//! and the tolerance, with limits of all members ([`Limit`](curvelax_statistics::Limit): its time and its error). Then
-//! rounds without levels, at a fifth of the work, find the number of members: their times are spread like the limits.
+//! A round runs the study, without its shards, in memory and on the CPU, so that the choice is the same on every
+//! machine. The uncertainty of a median has two parts: sampling falls like 1/√members, discretisation with n. First
+//! rounds find n and the tolerance, with limits of all members ([`Limit`](curvelax_statistics::Limit): its time and its
+//! error). Then rounds without levels, at a fifth of the work, find the number of members: their times are spread like
+//! the limits.
 //!
 //! The numbers of outlines are given. What is asked for is then the error of each member.
 //!
@@ -24,8 +25,8 @@ use curvelax_ensemble::{Ended, LevelTimes, Sink, Spec, Study, request::spec::Bac
 
 /// Share of the goal for discretisation, where sampling needs the rest.
 const DISCRETISATION: f64 = 0.1;
-/// What sampling leaves to the difference between times and their limits, in errors of discretisation, and at most in shares
-/// of the goal: in 14 ensembles of 330 to 3082 ellipses the interval of limits was wider by -0.1 to 3.4 of them.
+/// What sampling leaves to the difference between times and their limits, in errors of discretisation, and at most in
+/// shares of the goal: in 14 ensembles of 330 to 3082 ellipses the interval of limits was wider by -0.1 to 3.4 of them.
 const SPARE: [f64; 2] = [3.0, 0.1];
 /// Members of a cell above which no round is run, and nodes.
 const MAX_MEMBERS: f64 = 1e6;
@@ -35,7 +36,8 @@ const ORDER: f64 = 4.0;
 /// Bounds of the growth of n between rounds, and of that of the members.
 const FINER: [f64; 2] = [std::f64::consts::SQRT_2, 2.0];
 const MORE: [f64; 2] = [1.05, 8.0];
-/// An estimated number of members is believed if it is within the first factor of those that gave it; else this share of it.
+/// An estimated number of members is believed if it is within the first factor of those that gave it; else this share
+/// of it.
 const NEAR: f64 = 1.2;
 const CAUTION: f64 = 0.6;
 /// The least tolerance, in shares of what discretisation may have.
@@ -106,9 +108,9 @@ impl fmt::Display for Round {
     }
 }
 
-/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one, or else that come nearest to
-/// it; `tell` hears of every round, and an error of `stopped` ends them. The numbers of `spec` are those of the first
-/// round, and the least that are chosen.
+/// Returns `spec` with the nodes, tolerance and members that reach its goal, if it has one, or else that come nearest
+/// to it; `tell` receives every round, and an error of `stopped` ends them. The numbers of `spec` are those of the
+/// first round, and the least that are chosen.
 ///
 /// # Errors
 /// Those of the study, and that of `stopped`.
@@ -227,12 +229,12 @@ impl Search<'_> {
         let found = cells.collect::<Option<Vec<_>>>().and_then(farthest).map(|(all, discretisation)| {
             if statistics.of_each { Uncertainty::Each(all) } else { Uncertainty::Median { all, discretisation } }
         });
-        self.hear(spec, &study, found);
+        self.report(spec, &study, found);
         Ok((statistics.cells, found))
     }
 
-    /// A round of times alone. Where a member does not depend on how many there are, those of the last round are in `sums`
-    /// and are not run again.
+    /// A round of times alone. Where a member does not depend on how many there are, those of the last round are in
+    /// `sums` and are not run again.
     fn sampled(&mut self, spec: &Spec, sums: &mut Option<(u64, Tally)>) -> Result<Cells> {
         let mut study = quiet(spec, false)?;
         let is_alone = study.spec().sweep.cells() == 1 && study.spec().design.is_random();
@@ -244,11 +246,11 @@ impl Search<'_> {
         *sums = is_alone.then_some((spec.curves, tally));
         let widths: Option<Vec<f64>> = statistics.cells.iter().map(half_width).collect();
         let found = widths.and_then(|all| all.into_iter().reduce(f64::max)).map(Uncertainty::Sampling);
-        self.hear(spec, &study, found);
+        self.report(spec, &study, found);
         Ok(statistics.cells)
     }
 
-    fn hear(&mut self, spec: &Spec, study: &Study, found: Option<Uncertainty>) {
+    fn report(&mut self, spec: &Spec, study: &Study, found: Option<Uncertainty>) {
         self.rounds += 1;
         let Spec { points, adaptive: tolerance, .. } = *spec;
         let members = Spec { only: None, ..study.spec().clone() }.all_members();
@@ -293,7 +295,8 @@ fn half_width(cell: &CellStatistics) -> Option<f64> {
     Some((high - median).max(median - low) / median).filter(|width| width.is_finite())
 }
 
-/// The spec with more nodes and shorter steps, so that an error that is so many times as large as `allowed` comes down to it.
+/// The spec with more nodes and shorter steps, so that an error that is so many times as large as `allowed` comes down
+/// to it.
 fn finer(spec: Spec, times: f64, allowed: f64) -> Result<Spec> {
     let [least, most] = FINER;
     let factor = (2.0 * times).powf(1.0 / ORDER).clamp(least, most);

@@ -66,7 +66,7 @@ impl Platform {
 }
 
 /// A back end that suits a spec, not yet opened.
-pub struct Choice {
+pub struct ChosenBackend {
     device: Device,
     /// Its number, if it was requested by number.
     number: Option<String>,
@@ -80,7 +80,7 @@ pub struct Choice {
 ///
 /// # Errors
 /// [`Error::Request`] if the adapter, the precision or n is not available.
-pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
+pub fn choose(spec: &Spec, n: usize) -> Result<ChosenBackend> {
     match spec.backend {
         BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
         BackendChoice::Gpu => gpu(spec, n),
@@ -93,12 +93,12 @@ pub fn choose(spec: &Spec, n: usize) -> Result<Choice> {
 }
 
 /// Chooses back ends for the stages of a study: all on one device, that of its first own members, or with
-/// `--backend auto` on the CPU if that device cannot run all of them. A pilot is on the CPU: a few members do not fill a
-/// GPU. So are members that need more nodes than the device can hold.
+/// `--backend auto` on the CPU if that device cannot run all of them. A pilot is on the CPU: a few members do not fill
+/// a GPU. So are members that need more nodes than the device can hold.
 ///
 /// # Errors
 /// As [`choose`].
-pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
+pub fn choose_all(study: &Study) -> Result<Vec<ChosenBackend>> {
     let (stages, own) = (study.stages(), study.own_stage());
     let specs: Vec<Spec> = stages.iter().map(|stage| study.spec_of(stage)).collect::<Result<_>>()?;
     let choice = choose(&specs[own], specs[own].points)?;
@@ -113,7 +113,7 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
         choice.settle_place(&mut spec);
         choose(&spec, spec.points)
     };
-    let others: Result<Vec<Choice>> =
+    let others: Result<Vec<ChosenBackend>> =
         stages.iter().zip(&specs).enumerate().filter(|(i, _)| *i != own).map(|(_, of)| there(of)).collect();
     match others {
         Err(error) if choice.or_cpu => {
@@ -129,7 +129,7 @@ pub fn choose_all(study: &Study) -> Result<Vec<Choice>> {
 }
 
 /// Writes the settings chosen for the stages to a study, so that it can be repeated exactly.
-pub fn settle(study: &mut Study, choices: &[Choice]) {
+pub fn settle(study: &mut Study, choices: &[ChosenBackend]) {
     let stages = study.stages().to_vec();
     let own = || stages.iter().zip(choices).filter(|(stage, _)| stage.level.is_none());
     for (stage, choice) in own() {
@@ -140,7 +140,7 @@ pub fn settle(study: &mut Study, choices: &[Choice]) {
 }
 
 /// The choice of `--backend auto`: the first hardware GPU that can do the run, else the CPU.
-fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
+fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<ChosenBackend> {
     if spec.order == Order::Lexicographic {
         return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
     }
@@ -156,13 +156,13 @@ fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<Choice> {
     cpu(spec, n, reason)
 }
 
-fn cpu(spec: &Spec, n: usize, reason: String) -> Result<Choice> {
+fn cpu(spec: &Spec, n: usize, reason: String) -> Result<ChosenBackend> {
     let precision = spec.precision.unwrap_or(Precision::F64);
     check_precision(spec, n, precision)?;
-    Ok(Choice { device: Device::Cpu, number: None, or_cpu: false, precision, reason })
+    Ok(ChosenBackend { device: Device::Cpu, number: None, or_cpu: false, precision, reason })
 }
 
-fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
+fn gpu(spec: &Spec, n: usize) -> Result<ChosenBackend> {
     if spec.order == Order::Lexicographic {
         let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
         return Err(Error::Request(message.into()));
@@ -174,7 +174,7 @@ fn gpu(spec: &Spec, n: usize) -> Result<Choice> {
         false => {
             let adapter = chosen.swap_remove(0);
             let number = by_number.then(|| spec.adapter.clone()).flatten();
-            Ok(Choice { number, ..take(spec, n, adapter, "asked for".into())? })
+            Ok(ChosenBackend { number, ..take(spec, n, adapter, "asked for".into())? })
         }
         true => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
@@ -200,9 +200,9 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     }
 }
 
-fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<Choice> {
+fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<ChosenBackend> {
     let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
-    Ok(Choice { device: Device::Gpu(Arc::new(adapter)), number: None, or_cpu: false, precision, reason })
+    Ok(ChosenBackend { device: Device::Gpu(Arc::new(adapter)), number: None, or_cpu: false, precision, reason })
 }
 
 /// The precision of the run on an adapter, if members of `n` nodes fit.
@@ -254,8 +254,8 @@ fn ring(n: usize) -> Result<Blocks> {
         .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "use 6 or more"))
 }
 
-impl Choice {
-    /// What the user should know about the choice: nobody gets a software GPU who did not ask for a GPU.
+impl ChosenBackend {
+    /// What the user should know about the choice: a software GPU is used only if a GPU is requested.
     pub fn warning(&self) -> Option<String> {
         let gpu = self.device.gpu().filter(|_| self.is_software_gpu())?;
         Some(format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name()))
@@ -323,22 +323,22 @@ impl Choice {
 
     /// Returns the choice for a later part of a study whose first part runs `there`, since a study does not change
     /// device midway. If the GPU of the first part failed, this is the CPU; otherwise a GPU that fails is an error.
-    pub fn after(self, there: &Platform) -> Choice {
+    pub fn after(self, there: &Platform) -> ChosenBackend {
         match (self.device.kind(), there.backend) {
             (DeviceKind::Gpu, DeviceKind::Cpu) => self.on_cpu(there.reason.clone()),
-            _ => Choice { or_cpu: false, ..self },
+            _ => ChosenBackend { or_cpu: false, ..self },
         }
     }
 
     /// The same device for members of `n` nodes, or the CPU in f64 if it cannot hold them.
-    fn with_nodes(&self, spec: &Spec, n: usize) -> Result<Choice> {
+    fn with_nodes(&self, spec: &Spec, n: usize) -> Result<ChosenBackend> {
         let same = Spec { precision: Some(self.precision), ..spec.clone() };
         let fits = match &self.device {
             Device::Cpu => check_precision(&same, n, self.precision),
             Device::Gpu(gpu) => fitting_precision(&same, n, gpu.name(), &gpu.capacity()).map(drop),
         };
         match fits {
-            Ok(()) => Ok(Choice {
+            Ok(()) => Ok(ChosenBackend {
                 device: self.device.clone(),
                 number: self.number.clone(),
                 or_cpu: self.or_cpu,
@@ -349,23 +349,23 @@ impl Choice {
         }
     }
 
-    fn on_cpu(&self, reason: String) -> Choice {
-        Choice { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
+    fn on_cpu(&self, reason: String) -> ChosenBackend {
+        ChosenBackend { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
     }
 
     /// Falls back to the CPU if the GPU cannot be opened or computes wrongly.
-    pub fn or_cpu(self) -> Choice {
-        Choice { or_cpu: true, ..self }
+    pub fn or_cpu(self) -> ChosenBackend {
+        ChosenBackend { or_cpu: true, ..self }
     }
 
-    /// Returns whether the CPU may take over from the GPU, since nobody asked for that GPU.
+    /// Returns whether the CPU may take over from the GPU, since that GPU was not requested.
     pub fn may_fall_back(&self) -> bool {
         self.or_cpu
     }
 
     /// Replaces the reason of the choice.
-    pub fn because(self, reason: String) -> Choice {
-        Choice { reason, ..self }
+    pub fn because(self, reason: String) -> ChosenBackend {
+        ChosenBackend { reason, ..self }
     }
 
     /// Returns the chosen device.
@@ -376,15 +376,15 @@ impl Choice {
     /// Opens the device for a cohort of cells.
     ///
     /// # Errors
-    /// As [`open`](Choice::open).
+    /// As [`open`](ChosenBackend::open).
     pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
         self.open_watched(cohort, &OpeningWatch::default())
     }
 
-    /// Like [`open_for`](Choice::open_for), under the eyes of `watch`, which hears what is opened.
+    /// Like [`open_for`](ChosenBackend::open_for), under the eyes of `watch`, which receives what is opened.
     ///
     /// # Errors
-    /// As [`open`](Choice::open), and that of the watch.
+    /// As [`open`](ChosenBackend::open), and that of the watch.
     pub fn open_watched(&self, cohort: &[Cell], watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
         (watch.tell)(&self.sentence(&cohort[0].spec));
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
@@ -442,15 +442,15 @@ impl Choice {
 
 /// Watches a device being opened.
 pub struct OpeningWatch<'a> {
-    /// Hears which back end is opened, and in a `note: …` what is waited for, if that takes long.
+    /// Receives which back end is opened, and in a `note: …` what is waited for, if that takes long.
     pub tell: &'a dyn Fn(&str),
     /// Asked several times a second during the wait; an error ends it.
-    pub go_on: &'a dyn Fn() -> Result<()>,
+    pub may_continue: &'a dyn Fn() -> Result<()>,
 }
 
 impl Default for OpeningWatch<'_> {
     fn default() -> Self {
-        OpeningWatch { tell: &|_| {}, go_on: &|| Ok(()) }
+        OpeningWatch { tell: &|_| {}, may_continue: &|| Ok(()) }
     }
 }
 
@@ -479,7 +479,7 @@ fn open_gpu<T: Vectorised>(
     let then =
         limit.map_or(String::new(), |limit| format!("; after {} s the CPU is used instead", limit.as_secs_f64()));
     let waits = || (watch.tell)(&format!("note: GPU {} is still compiling the kernel{then}", gpu.name()));
-    gpu.compile::<T>(blocks, variant, limit, &waits, watch.go_on)?;
+    gpu.compile::<T>(blocks, variant, limit, &waits, watch.may_continue)?;
     let mut kernel = Kernel::<T>::new(gpu, blocks, members, tested.max_sweeps, variant)?;
     let device = format!("{} ({})", gpu.name(), gpu.driver());
     self_test::<T>(&mut kernel, &device, gpu.is_hardware(), &tested, blocks.n, adaptive, driven)?;

@@ -2,14 +2,14 @@
 
 use crate::placement::{Platform, choose_all};
 use curvelax_base::error::Result;
-use curvelax_ensemble::{Judged, LevelTimes, Sink, Study, simulate::simulate};
+use curvelax_ensemble::{LevelSink, LevelTimes, Sink, Study, simulate::simulate};
 
 /// Relaxes the members of a study on the device given by its spec, by default the first hardware GPU that can do it and
-/// else the CPU, and passes each to `sink` in member order. A `Vec` of [`Ended`](curvelax_ensemble::Ended) is a sink that
-/// collects them.
+/// else the CPU, and passes each to `sink` in member order. A `Vec` of [`Ended`](curvelax_ensemble::Ended) is a sink
+/// that collects them.
 ///
-/// Returns where they were computed. The first [`PORTRAITS`](curvelax_ensemble::study::PORTRAITS) members come with their
-/// nodes.
+/// Returns where they were computed. The first [`PORTRAITS`](curvelax_ensemble::study::PORTRAITS) members come with
+/// their nodes.
 ///
 /// ```
 /// use curvelax_ensemble::{Spec, Study};
@@ -47,7 +47,7 @@ pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
                 (choice.open_for(&cells)?.0, choice.precision())
             }
         };
-        let mut sink = Judged { level: stage.level, precision, cells: &cells, levels: &mut levels, sink };
+        let mut sink = LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink };
         simulate(&cells, precision, backend.as_mut(), study.portraits(stage), &mut sink)?;
     }
     Ok(platform)

@@ -33,9 +33,9 @@ pub(super) fn geometric_agrees<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) 
     Ok(())
 }
 
-/// Stage by stage and after fixed and adaptive steps, by the same bounds; the kernel is another one than that of `other`. In
-/// f32 only after few adaptive steps: x counts in their errors, which are then next to rounding, and of forty steps one side
-/// makes another number.
+/// Stage by stage and after fixed and adaptive steps, by the same bounds; the kernel is another one than that of
+/// `other`. In f32 only after few adaptive steps: x counts in their errors, which are then next to rounding, and of
+/// forty steps one side makes another number.
 fn driven_agree<T: Evolves>([as_driven, other]: [Driven; 2], gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     check(&stages_of::<T>(as_driven, gpu, solver, n, None)?)?;
     let many = (T::PRECISION == Precision::F64).then_some(None);
@@ -90,7 +90,8 @@ pub(super) fn another_force_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usiz
     Ok(())
 }
 
-/// The factors of the waves of γ and of M are in the comparison: with those of one a thousandth larger on the GPU, it fails.
+/// The factors of the waves of γ and of M are in the comparison: with those of one a thousandth larger on the GPU, it
+/// fails.
 pub(super) fn another_crystal_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let energy: fn(&mut Run<f64>) = |run| run.parameters.law[ENERGY_WAVES + 1] *= 1.001;
     let mobility: fn(&mut Run<f64>) = |run| run.parameters.law[DIFFUSIVITY_WAVES + 2] *= 1.001;

@@ -73,7 +73,7 @@ pub fn trials() -> Vec<Trial> {
         };
         add("a device that is lost between dispatches is an error by name", lost_between_dispatches);
         add("a device that is lost during a dispatch is an error by name", lost_during_a_dispatch);
-        add("on a lost device nothing is opened, and auto goes on with the CPU", lost_before);
+        add("on a lost device nothing is opened, and auto continues on the CPU", lost_before);
         add("a cap of one sweep fails members, not the self-test", a_cap_of_one_sweep);
         add("a device without room for the slots is an error with their bytes", no_room);
         add("a dispatch is given up at its limit, and waited for in slices", slow_dispatch);
@@ -355,7 +355,7 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let adapter = Some(gpu.name().to_string());
     let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: Some(0.01.into()), ..Spec::default() }
         .validate()?;
-    let choice = || -> Result<placement::Choice, Failed> {
+    let choice = || -> Result<placement::ChosenBackend, Failed> {
         let choice = placement::choose(&spec, spec.points)?;
         let gpu = choice.device().gpu().ok_or("no GPU")?;
         let blocks = Blocks::new(spec.points).ok_or("n")?;
@@ -389,7 +389,7 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     named(later.open(&spec, spec.points), gpu, "the device was lost")
 }
 
-fn choice_like(spec: &Spec) -> curvelax::Result<placement::Choice> {
+fn choice_like(spec: &Spec) -> curvelax::Result<placement::ChosenBackend> {
     placement::choose(spec, spec.points)
 }
 
@@ -426,7 +426,7 @@ fn slow_dispatch(gpu: &Gpu) -> Outcome {
         let whole = started.elapsed();
         kernel.finish(0)?;
         println!("{work:?}: a dispatch of {whole:.1?}, waited for in {slices} slices of 1 ms");
-        require(kernel.is_back(0, slice), || "nothing is on its way, and it is waited for".into())?;
+        require(kernel.is_back(0, slice), || "no transfer is pending, and one is waited for".into())?;
         if slices >= 10 {
             break whole;
         }

@@ -285,7 +285,7 @@ class Package(unittest.TestCase):
             own = study.summary[study.summary.cell == cell]
             self.assertEqual(line.get_xdata()[1:-1].tolist(), sorted(own.t_relax))
         self.assertEqual(study.plot(axes), axes)
-        # A cell in which nobody relaxes stays at 1, to the end.
+        # A cell in which no member relaxes stays at 1, to the end.
         study = curvelax.run(**SMALL, sweep={"t_end": [0.1, 5]}, units="um,h", mobility=1)
         first = study.plot().get_lines()[0]
         self.assertEqual((first.get_xdata().tolist(), first.get_ydata().tolist()), ([0, 0.1], [1, 1]))
@@ -402,7 +402,7 @@ class Package(unittest.TestCase):
             ({1: ellipse(2, 1), "1": ellipse(3, 1)}, ["two outlines have the same label"]),
         ]:
             message = self.refused(*words, shape=shape)
-            self.assertNotIn("/", message.replace("n/2", ""), "a path of a file that nobody wrote")
+            self.assertNotIn("/", message.replace("n/2", ""), "a path of a file that no user wrote")
 
     def test_contours_of_opencv_are_outlines(self):
         contour = np.round(1000 * ellipse(2, 1, 200)).astype(np.int32)

@@ -34,7 +34,7 @@ use curvelax_flow::{
     },
     solver::{Blocks, Solver},
 };
-use vectors::Crew;
+use vectors::Workers;
 
 /// Resident groups per thread and batch: enough that threads finish together, few enough that members finish in order.
 const GROUPS_PER_THREAD: usize = 4;
@@ -58,7 +58,7 @@ pub struct CpuBackend<T> {
     batches: Vec<CpuBatch<T>>,
     slots: usize,
     method: Method,
-    crew: Arc<dyn Crew<T>>,
+    workers: Arc<dyn Workers<T>>,
     pool: Arc<rayon::ThreadPool>,
     /// Steps of the next batch; results do not depend on it, to the last bit.
     steps: u32,
@@ -91,13 +91,13 @@ impl<T: Vectorised> CpuBackend<T> {
     /// Like [`CpuBackend::new`], for `members` members: with vectors no wider than the members fill and than memory
     /// allows.
     pub fn for_members(blocks: Blocks, method: Method, threads: usize, members: u64) -> Result<Self> {
-        let crew = |vectors: &Vectors| Some((*vectors, T::crew(*vectors, method.solver, blocks, 1).ok()?));
-        let crews: Vec<_> = Vectors::ALL.iter().filter(|vectors| vectors.are_available()).filter_map(crew).collect();
-        let fits = crews.iter().filter(|(_, crew)| crew.bytes_of_team() <= ROOM);
-        let most = fits.map(|(_, crew)| crew.lanes()).max().unwrap_or(1);
-        let enough = crews.iter().map(|(_, crew)| crew.lanes()).filter(|lanes| *lanes as u64 >= members).min();
+        let workers = |vectors: &Vectors| Some((*vectors, T::workers(*vectors, method.solver, blocks, 1).ok()?));
+        let crews: Vec<_> = Vectors::ALL.iter().filter(|vectors| vectors.are_available()).filter_map(workers).collect();
+        let fits = crews.iter().filter(|(_, workers)| workers.bytes_of_team() <= ROOM);
+        let most = fits.map(|(_, workers)| workers.lanes()).max().unwrap_or(1);
+        let enough = crews.iter().map(|(_, workers)| workers.lanes()).filter(|lanes| *lanes as u64 >= members).min();
         let lanes = enough.map_or(most, |enough| enough.min(most));
-        let widest = crews.iter().rfind(|(_, crew)| crew.lanes() == lanes).map(|(vectors, _)| *vectors);
+        let widest = crews.iter().rfind(|(_, workers)| workers.lanes() == lanes).map(|(vectors, _)| *vectors);
         Self::with_vectors(blocks, method, threads, widest.unwrap_or(Vectors::None))
     }
 
@@ -106,25 +106,25 @@ impl<T: Vectorised> CpuBackend<T> {
         // A panic shows as a batch that does not come back.
         let pool = threads::pool(threads)?;
         let threads = pool.current_num_threads();
-        let crew = T::crew(vectors, method.solver, blocks, threads)?;
+        let workers = T::workers(vectors, method.solver, blocks, threads)?;
         let of_member = STATE_FIELDS * blocks.n * size_of::<T>();
-        let batches = if BATCHES * crew.lanes() * of_member <= ROOM { BATCHES } else { 1 };
-        let usual = SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * crew.lanes());
-        let slots = threads * usual.min((ROOM / of_member / batches).max(crew.lanes()));
+        let batches = if BATCHES * workers.lanes() * of_member <= ROOM { BATCHES } else { 1 };
+        let usual = SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * workers.lanes());
+        let slots = threads * usual.min((ROOM / of_member / batches).max(workers.lanes()));
         let batch = || CpuBatch { members: (0..slots).map(|_| None).collect(), coming: None, back: None };
         Ok(CpuBackend {
             batches: (0..batches).map(|_| batch()).collect(),
             slots: batches * slots,
             method,
-            crew: crew.into(),
+            workers: workers.into(),
             pool,
             steps: 1,
             time: ADVANCE_TIME,
         })
     }
 
-    /// Gets room for all of `members` members in one batch, which is advanced for `time`, or a step of each if that takes
-    /// longer: all of them move at once, for somebody who watches.
+    /// Gets room for all of `members` members in one batch, which is advanced for `time`, or a step of each if that
+    /// takes longer: all of them move at once, for somebody who watches.
     pub fn for_display(mut self, members: usize, time: Duration) -> Self {
         self.batches = vec![CpuBatch { members: (0..members).map(|_| None).collect(), coming: None, back: None }];
         (self.slots, self.time) = (members, time);
@@ -153,7 +153,7 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
     }
 
     fn abreast(&self) -> usize {
-        self.crew.lanes() * self.threads()
+        self.workers.lanes() * self.threads()
     }
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
@@ -180,14 +180,14 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
         let mut members = std::mem::take(&mut batch.members);
         let (back, coming) = channel();
         batch.coming = Some(coming);
-        let (crew, method, attempts) = (Arc::clone(&self.crew), self.method, self.steps);
+        let (workers, method, attempts) = (Arc::clone(&self.workers), self.method, self.steps);
         threads::hand_over(&self.pool, move || {
             let started = Instant::now();
             let mut running: Vec<&mut Run<T>> =
                 members.iter_mut().flatten().map(|run| &mut **run).filter(|run| run.counters.is_running()).collect();
-            let groups = Group::of(&mut running, crew.lanes());
-            groups.into_par_iter().for_each(|group| crew.advance(group, &method, attempts));
-            // If nobody waits any more, the run has ended.
+            let groups = Group::of(&mut running, workers.lanes());
+            groups.into_par_iter().for_each(|group| workers.advance(group, &method, attempts));
+            // If no receiver is left, the run has ended.
             let _ = back.send((members, started.elapsed()));
         });
         Ok(())

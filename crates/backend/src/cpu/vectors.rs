@@ -64,23 +64,23 @@ impl Vectors {
 /// A number with vector code. Implemented for each number by name, so that the code is compiled once, here, and not in
 /// every program that uses a back end.
 pub trait Vectorised: Evolves {
-    /// Creates a crew of `threads` threads for rings cut by `blocks`.
+    /// Creates a workers of `threads` threads for rings cut by `blocks`.
     #[doc(hidden)]
-    fn crew(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Result<Box<dyn Crew<Self>>>;
+    fn workers(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Result<Box<dyn Workers<Self>>>;
 }
 
 macro_rules! vectorised {
     ($($real:ident)*) => {
         $(
             impl Vectorised for $real {
-                fn crew(
+                fn workers(
                     vectors: Vectors,
                     solver: Solver,
                     blocks: Blocks,
                     threads: usize,
-                ) -> Result<Box<dyn Crew<$real>>> {
-                    let crew = by_solver!(solver, S => crew_by::<S, $real>(vectors, blocks, threads));
-                    crew.ok_or_else(|| Error::Failed(format!("this processor has no vectors of {vectors:?}")))
+                ) -> Result<Box<dyn Workers<$real>>> {
+                    let workers = by_solver!(solver, S => workers_by::<S, $real>(vectors, blocks, threads));
+                    workers.ok_or_else(|| Error::Failed(format!("this processor has no vectors of {vectors:?}")))
                 }
             }
         )*
@@ -89,13 +89,13 @@ macro_rules! vectorised {
 
 vectorised!(f64 f32);
 
-/// Creates a crew for the solver `M` if the processor has the vectors.
+/// Creates a workers for the solver `M` if the processor has the vectors.
 ///
 /// An elimination is a chain of dependent results, so two of the smaller registers are interleaved. Sweeps have no such
 /// chain, and visit their rows so often that these must stay in the nearest cache, so fewer members run side by side.
-fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Crew<T>>> {
+fn workers_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize) -> Option<Box<dyn Workers<T>>> {
     match vectors {
-        Vectors::None => Some(Teams::<_, M, T>::crew(pulp::Scalar::new(), blocks, threads)),
+        Vectors::None => Some(VectorWorkers::<_, M, T>::workers(pulp::Scalar::new(), blocks, threads)),
         _ if WITHOUT_VECTORS => None,
         #[cfg(target_arch = "x86_64")]
         Vectors::Bits128 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
@@ -114,17 +114,17 @@ fn crew_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usize)
     }
 }
 
-/// Creates a crew whose members fill `R` registers of the instructions, if the processor has them.
+/// Creates a workers whose members fill `R` registers of the instructions, if the processor has them.
 fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd: Option<S>,
     blocks: Blocks,
     threads: usize,
-) -> Option<Box<dyn Crew<T>>> {
+) -> Option<Box<dyn Workers<T>>> {
     let solver = PhantomData::<fn() -> M>;
     simd.map(|simd| with_lanes::<S, T, R, _>(simd, Abreast { simd, solver, blocks, threads }))
 }
 
-/// Everything that defines a crew, except its lanes.
+/// Everything that defines a workers, except its lanes.
 struct Abreast<S, M> {
     simd: S,
     solver: PhantomData<fn() -> M>,
@@ -133,10 +133,10 @@ struct Abreast<S, M> {
 }
 
 impl<S: Simd, M: Solves, T: Real> WithLanes<T> for Abreast<S, M> {
-    type Output = Box<dyn Crew<T>>;
+    type Output = Box<dyn Workers<T>>;
 
-    fn call<N: Number<Real = T>>(self) -> Box<dyn Crew<T>> {
-        Teams::<S, M, N>::crew(self.simd, self.blocks, self.threads)
+    fn call<N: Number<Real = T>>(self) -> Box<dyn Workers<T>> {
+        VectorWorkers::<S, M, N>::workers(self.simd, self.blocks, self.threads)
     }
 }
 
@@ -154,7 +154,7 @@ use Real as Lane;
 
 /// Threads that advance groups of members.
 #[doc(hidden)]
-pub trait Crew<T>: Send + Sync {
+pub trait Workers<T>: Send + Sync {
     /// Returns the number of members side by side in a group.
     fn lanes(&self) -> usize;
 
@@ -166,7 +166,7 @@ pub trait Crew<T>: Send + Sync {
 }
 
 /// Lanes of `N` in the instructions `S`, whose presence the token proves, for the solver `M`; one team per thread.
-struct Teams<S, M, N: Number> {
+struct VectorWorkers<S, M, N: Number> {
     simd: S,
     solver: PhantomData<fn() -> M>,
     blocks: Blocks,
@@ -174,10 +174,10 @@ struct Teams<S, M, N: Number> {
     teams: Vec<Mutex<Option<Team<N>>>>,
 }
 
-impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Teams<S, M, N> {
-    fn crew(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Crew<T>> {
+impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> VectorWorkers<S, M, N> {
+    fn workers(simd: S, blocks: Blocks, threads: usize) -> Box<dyn Workers<T>> {
         let teams = (0..threads).map(|_| Mutex::new(None::<Team<N>>)).collect();
-        Box::new(Teams { simd, solver: PhantomData::<fn() -> M>, blocks, teams })
+        Box::new(VectorWorkers { simd, solver: PhantomData::<fn() -> M>, blocks, teams })
     }
 
     /// Returns the team of a thread, which is still in its cache, or else an unused one.
@@ -187,7 +187,7 @@ impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Teams<S, M, N> {
     }
 }
 
-impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Crew<T> for Teams<S, M, N> {
+impl<S: Simd, M: Solves, T: Real, N: Number<Real = T>> Workers<T> for VectorWorkers<S, M, N> {
     fn lanes(&self) -> usize {
         N::LANES
     }

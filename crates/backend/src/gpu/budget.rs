@@ -27,8 +27,8 @@ impl Budget {
         if hardware {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times, and
-        // the end of an adaptive one, which may come after any of its parts, as often again.
+        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times,
+        // and the end of an adaptive one, which may come after any of its parts, as often again.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 20 } else { 10 };
         Budget {

@@ -1,7 +1,7 @@
 //! The host's mirror of a batch of slots: what goes into its buffers before a dispatch, and what comes back.
 //!
-//! Only the changed part is uploaded, together with the list of members that are due; only they get a workgroup. Whoever
-//! owns the buffers, wgpu or a browser, carries the bytes.
+//! Only the changed part is uploaded, together with the list of members that are due; only they get a workgroup.
+//! Whoever owns the buffers, wgpu or a browser, carries the bytes.
 
 use super::{budget::Budget, shader::TRACE_FIELDS};
 use curvelax_flow::{

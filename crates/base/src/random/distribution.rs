@@ -16,9 +16,9 @@
 //! | `each(a,b,...)` | the same, but member j has value j |
 //! | `empirical(a,b,...)` | between the two values, in ascending order, with ranks around u count - 1/2 |
 //!
-//! `LAW in a..b` is the continuous law under the condition that the number lies there: its quantile at F(a) + u (F(b) - F(a)),
-//! F the share of the law below a number. `table(FILE,COLUMN)` is `each` of a column of a file; it is read once, so that a run
-//! can be repeated without the file.
+//! `LAW in a..b` is the continuous law under the condition that the number lies there: its quantile at F(a) + u (F(b) -
+//! F(a)), F the share of the law below a number. `table(FILE,COLUMN)` is `each` of a column of a file; it is read once,
+//! so that a run can be repeated without the file.
 //!
 //! z(u) is the [quantile of the standard normal law](super::normal_quantile).
 
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn means_and_quantiles_of_a_hundred_thousand_draws_are_the_exact_ones_within_four_standard_errors() {
+    fn means_and_quantiles_of_many_draws_agree_with_the_exact_ones() {
         let (seed, count) = (11, 100_000_u64);
         for text in ALL {
             let law = distribution(text);

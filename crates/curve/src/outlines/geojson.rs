@@ -1,9 +1,9 @@
 //! GeoJSON (RFC 7946): a FeatureCollection, a Feature or a geometry.
 //!
 //! Every Polygon is an outline, every polygon of a MultiPolygon is one of its own, and so is a closed LineString. Holes
-//! are refused. Coordinates are longitude and latitude in degrees, as the RFC says, except in two cases: the member `crs`
-//! of the older GeoJSON 2008 is null or names another reference system, or coordinates of the file are no degrees. They
-//! are then taken as coordinates of the plane, and a note says so, except of null.
+//! are refused. Coordinates are longitude and latitude in degrees, as the RFC says, except in two cases: the member
+//! `crs` of the older GeoJSON 2008 is null or names another reference system, or coordinates of the file are no
+//! degrees. They are then taken as coordinates of the plane, and a note says so, except of null.
 
 use std::borrow::Cow;
 

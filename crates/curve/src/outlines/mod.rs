@@ -10,14 +10,14 @@
 //! The extension says what the format is, and the content is checked. An outline in degrees is projected to kilometres
 //! about its own centroid, with a warning that states the projection.
 //!
-//! [`read_all`] reads the outlines of a file with a label each: the name of the feature, ring or array, or else the name
-//! of the file, numbered if it has several. [`Outline::read`] reads a file of one outline. If an outline is refused, so
-//! is the whole file: nothing is left out silently.
+//! [`read_all`] reads the outlines of a file with a label each: the name of the feature, ring or array, or else the
+//! name of the file, numbered if it has several. [`Outline::read`] reads a file of one outline. If an outline is
+//! refused, so is the whole file: nothing is left out silently.
 //!
 //! # Tables
 //!
-//! One point per line, in columns separated by commas, semicolons, tabs or spaces, in UTF-8. Lines that begin with `#` are
-//! skipped. A first line without any number is a header; it must name the columns `x` and `y`, or `lon` and `lat`.
+//! One point per line, in columns separated by commas, semicolons, tabs or spaces, in UTF-8. Lines that begin with `#`
+//! are skipped. A first line without any number is a header; it must name the columns `x` and `y`, or `lon` and `lat`.
 
 mod columns;
 mod geojson;
@@ -77,12 +77,13 @@ impl Labelled {
     }
 }
 
-/// Reads all outlines of the file at `path`, relative to the directory `base`, in their order; messages name only `path`.
+/// Reads all outlines of the file at `path`, relative to the directory `base`, in their order; messages name only
+/// `path`.
 ///
 /// # Errors
 /// [`Error::Request`] naming the path, the place in the file, the value and the remedy: the file cannot be read, is not
-/// of its format, or has no outlines; an outline is refused, see [`Outline::read`]. If several are, the message is about
-/// the first and gives their number.
+/// of its format, or has no outlines; an outline is refused, see [`Outline::read`]. If several are, the message is
+/// about the first and gives their number.
 pub fn read_all(base: &Path, path: &Path) -> Result<Vec<Labelled>> {
     from_bytes(path, &content(base, path)?)
 }
@@ -114,11 +115,11 @@ impl Outline {
     /// Reads the outline of a file.
     ///
     /// # Errors
-    /// [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is empty, is not
-    /// of its [format](crate::outlines), or has several outlines; an outline holds more than
+    /// [`Error::Request`] naming the path, the line, the value and the remedy: the file cannot be read, is empty, is
+    /// not of its [format](crate::outlines), or has several outlines; an outline holds more than
     /// [`MAX_POINTS`](super::MAX_POINTS) points or fewer than three distinct ones; a line of a table is not a pair of
-    /// finite numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline that
-    /// crosses itself is accepted with a warning.
+    /// finite numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline
+    /// that crosses itself is accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
         Outline::read_from(Path::new(""), path)
     }
@@ -346,8 +347,8 @@ fn make_unique(outlines: &mut [Labelled]) {
 
 /// Returns the paths of the files that match `pattern`, relative to the directory `base`, in the order of their names.
 ///
-/// `*` and `?` stand for any characters but `/`, `[abc]` for one of these, `**` for directories. Names that begin with a
-/// dot are matched only by a dot.
+/// `*` and `?` stand for any characters but `/`, `[abc]` for one of these, `**` for directories. Names that begin with
+/// a dot are matched only by a dot.
 ///
 /// # Errors
 /// [`Error::Request`] if the pattern is wrong, a directory cannot be read, or nothing matches.

@@ -190,8 +190,8 @@ impl PointArray {
     }
 }
 
-/// Checks the header before it is parsed: its length, how deeply it nests, and that no size overflows. Returns where the
-/// numbers begin.
+/// Checks the header before it is parsed: its length, how deeply it nests, and that no size overflows. Returns where
+/// the numbers begin.
 fn check_header(bytes: &[u8]) -> Result<usize, String> {
     let damaged = || "no NumPy array: its header is damaged".to_owned();
     let version = bytes.strip_prefix(MAGIC).and_then(|rest| rest.first()).ok_or_else(damaged)?;

@@ -1,7 +1,7 @@
 //! Longitude and latitude to the plane: Lambert's azimuthal equal-area projection about the outline's own centroid.
 //!
-//! Latitudes on the WGS 84 ellipsoid become authalic ones φ first, by series in its eccentricity: those on the sphere of
-//! the same area, R = 6371.0072 km, between which all areas agree. With the centre (λ₀, φ₀)
+//! Latitudes on the WGS 84 ellipsoid become authalic ones φ first, by series in its eccentricity: those on the sphere
+//! of the same area, R = 6371.0072 km, between which all areas agree. With the centre (λ₀, φ₀)
 //!
 //! ```text
 //! x = R k cos φ sin Δλ                      Δλ = λ - λ₀
@@ -12,8 +12,9 @@
 //! from Snyder, *Map Projections – A Working Manual*, USGS Professional Paper 1395 (1987), chapters 3 and 24.
 //! Its cosines of small angles are replaced by sines of half angles here, so that an islet keeps its digits.
 //!
-//! Areas are those on the ellipsoid. Lengths are off by 0.2 % at most near the centre, and by a factor of 1 ± c²/8 at the
-//! distance c (radians) from it, which is 0.1 % at 570 km. An edge becomes a straight line between its projected ends.
+//! Areas are those on the ellipsoid. Lengths are off by 0.2 % at most near the centre, and by a factor of 1 ± c²/8 at
+//! the distance c (radians) from it, which is 0.1 % at 570 km. An edge becomes a straight line between its projected
+//! ends.
 //!
 //! Sines have the period of the longitude, so an outline across the antimeridian needs no special case.
 
@@ -106,7 +107,8 @@ impl Lambert {
 /// Projects a ring in degrees to kilometres, and returns the centre, its centroid, in degrees.
 ///
 /// # Errors
-/// [`curvelax_base::error::Error::Request`] for a point that is no longitude and latitude, and for an outline that goes round the Earth.
+/// [`curvelax_base::error::Error::Request`] for a point that is no longitude and latitude, and for an outline that goes
+/// round the Earth.
 pub(super) fn project(source: Source, ring: &mut RingPoints) -> Result<DVec2> {
     for (i, DVec2 { x, y }) in ring.points.iter().enumerate() {
         if !((-180.0..=360.0).contains(x) && (-90.0..=90.0).contains(y)) {
@@ -152,8 +154,8 @@ fn mean_direction(places: &[DVec2]) -> Option<DVec2> {
     (mean.length() > 1e-6 || places.is_empty()).then_some(degrees)
 }
 
-/// Removes the cut along a meridian that opens an outline round a pole in longitude and latitude: (180, -84), (180, -90),
-/// (-180, -90), (-180, -84). On the sphere its two sides are one, and the pole is inside.
+/// Removes the cut along a meridian that opens an outline round a pole in longitude and latitude: (180, -84), (180,
+/// -90), (-180, -90), (-180, -84). On the sphere its two sides are one, and the pole is inside.
 fn close_over_poles(ring: &mut RingPoints) {
     let points = &ring.points;
     let same = |a: DVec2, b: DVec2| a.y == b.y && ((a.x - b.x) % 360.0 == 0.0 || a.y.abs() == 90.0);
@@ -200,7 +202,8 @@ mod tests {
         DVec3::new(latitude.cos() * longitude.cos(), latitude.cos() * longitude.sin(), latitude.sin())
     }
 
-    /// The same cases in every run, or others with `CURVELAX_TESTS=all`; the seed that is printed is then that of `Fixed`.
+    /// The same cases in every run, or others with `CURVELAX_TESTS=all`; the seed that is printed is then that of
+    /// `Fixed`.
     fn seed() -> RngSeed {
         let seed = match std::env::var("CURVELAX_TESTS") {
             Ok(tests) if tests == "all" => std::time::UNIX_EPOCH.elapsed().map_or(1, |time| time.as_nanos() as u64),

@@ -1,9 +1,9 @@
-//! Tables of points: one point a line, in columns.
+//! Tables of points: one point per line, in columns.
 //!
 //! The separator is the first of comma, semicolon, tab and spaces under which the first line is a header that names the
 //! coordinates, or consists of numbers. Decimal commas are read where commas do not separate. Blank lines at the edges
-//! and lines that begin with `#` are skipped. A header names the columns `x` and `y`, or `lon` and `lat` (degrees); other
-//! columns are properties of the outline if they are constant over it.
+//! and lines that begin with `#` are skipped. A header names the columns `x` and `y`, or `lon` and `lat` (degrees);
+//! other columns are properties of the outline if they are constant over it.
 //!
 //! A table of several outlines separates them by blank lines, by rows of NaN, by lines that begin with `>`, or by a
 //! column called ring, id, part or label. Its rings are never joined.
@@ -110,15 +110,15 @@ impl PointTable {
         }
     }
 
-    /// The columns that name the ring of a point. A column that numbers the points, of the file or of each of its rings,
-    /// is none of them.
+    /// The columns that name the ring of a point. A column that numbers the points, of the file or of each of its
+    /// rings, is none of them.
     fn ring_columns(&self, columns: &Columns) -> Vec<usize> {
         let names_rings = |i: &usize| is_ring_column(&columns.others[*i].0) && !self.numbers_points(&self.others[*i]);
         (0..columns.others.len()).filter(names_rings).collect()
     }
 
-    /// Whether values, as indices into `words`, are all different, or numbers that rise over three points at least before
-    /// they begin again.
+    /// Whether values, as indices into `words`, are all different, or numbers that rise over three points at least
+    /// before they begin again.
     fn numbers_points(&self, values: &[u32]) -> bool {
         // Where rings are named, this ends it at once.
         if values.len() < 2 || values.windows(2).any(|pair| pair[0] == pair[1]) {
@@ -168,8 +168,8 @@ impl PointTable {
         for start in starts.iter().filter(|_| !keys.is_empty()) {
             let key: Vec<u32> = keys.iter().map(|key| key[*start]).collect();
             // Two rings of one name may follow each other, separated by a row of NaN.
-            let goes_on = *start > 0 && !new_key(start);
-            if !seen.insert(key) && !goes_on {
+            let continues = *start > 0 && !new_key(start);
+            if !seen.insert(key) && !continues {
                 let shown: Vec<&str> = keys.iter().map(|key| &*self.words[key[*start] as usize]).collect();
                 let problem = format!("the outline `{}` appears again", shortened(&shown.join("/"), SHOWN));
                 let remedy = "write the points of an outline one after the other";
@@ -262,7 +262,8 @@ impl Reader<'_> {
             self.coordinate(line, x, columns, columns.x, table)?,
             self.coordinate(line, y, columns, columns.y, table)?,
         );
-        // Other columns may be left out at the end of a row, as spreadsheets do. A ring without a name would be another.
+        // Other columns may be left out at the end of a row, as spreadsheets do. A ring without a name would be
+        // another.
         let is_ring = |(name, at): &&(String, usize)| *at >= fields.len() && is_ring_column(name);
         if let Some((name, _)) = columns.others.iter().find(is_ring) {
             let (found, all) = (fields.len(), columns.count);
@@ -575,7 +576,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_without_end_is_refused_before_it_is_cut_into_columns() {
+    fn an_overlong_line_is_refused_before_it_is_split_into_columns() {
         let long = |columns: usize| format!("x,y{}\n0,0\n1,0\n1,1\n", ",".repeat(columns));
         assert_eq!(vertices(&long(MAX_LINE - 3)).len(), 3);
         assert_refused(&long(MAX_LINE - 2), &["line 1: a line of more than 64 KB; ", "x,y, of at most 64 KB"]);

@@ -312,11 +312,11 @@ fn every_line_of_well_known_text_is_read() {
     assert!(crossed[0].outline.warnings()[0].starts_with("all.wkt: line 1: the outline crosses"));
     for (line, problem) in [
         ("POLYGON ((0 0, 1 0, 0 1, 0 0)", "lacks a closing bracket"),
-        ("POLYGON ((0 0, 1 0, 0 1, 0 0)))", "goes on after its last bracket"),
+        ("POLYGON ((0 0, 1 0, 0 1, 0 0)))", "continues after its last bracket"),
         ("POLYGON ((0 0 0 0 0, 1 0, 0 1, 0 0))", "has a point of 5 numbers"),
         ("POLYGON )(0 0, 1 0, 0 1)", "has a closing bracket too many"),
-        ("POLYGON ((0 0, 1 0, 0 1)) POLYGON", "goes on after its last bracket"),
-        ("POLYGON ((0 0, 1 0, 0 1))(0 0)", "goes on after its last bracket"),
+        ("POLYGON ((0 0, 1 0, 0 1)) POLYGON", "continues after its last bracket"),
+        ("POLYGON ((0 0, 1 0, 0 1))(0 0)", "continues after its last bracket"),
         ("POLYGON (0 0, 1 0, 0 1)", "is not well-known text"),
         ("POLYGON ((0 0, 1, 0 1))", "has a point of 1 number;"),
         ("POLYGON ((0 0, 1 x, 0 1, 0 0))", "has `x` where a number is expected;"),

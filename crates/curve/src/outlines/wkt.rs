@@ -1,7 +1,7 @@
 //! Well-known text: one POLYGON, MULTIPOLYGON or closed LINESTRING a line, as spatial databases write it.
 //!
-//! Coordinates are those of the plane. `SRID=4326;` before a geometry, as PostGIS writes it, says that they are degrees;
-//! any other SRID is of the plane. Blank lines and lines that begin with `#` are skipped; heights are ignored.
+//! Coordinates are those of the plane. `SRID=4326;` before a geometry, as PostGIS writes it, says that they are
+//! degrees; any other SRID is of the plane. Blank lines and lines that begin with `#` are skipped; heights are ignored.
 
 use glam::DVec2;
 use wkt::{
@@ -107,7 +107,7 @@ fn check_brackets(text: &str) -> Result<(), NoOutline> {
             _ => {}
         }
         if c == ')' && depth == 0 && !text[i + 1..].trim().is_empty() {
-            return Err(wrong("goes on after its last bracket"));
+            return Err(wrong("continues after its last bracket"));
         }
     }
     match depth {

@@ -219,11 +219,13 @@ impl Dependence<'_> {
         }
     }
 
-    /// The scale: `wish` if all values allow it.
-    fn scale(&self, wish: Option<Scale>, values: &[f64]) -> Scale {
+    /// The scale: `preferred` if all values allow it.
+    fn scale(&self, preferred: Option<Scale>, values: &[f64]) -> Scale {
         let fitted = self.series.iter().any(|series| series.law().is_some());
         let default = if fitted { Scale::Log } else { Scale::of(values.iter().copied()) };
-        Some(wish.unwrap_or(default)).filter(|scale| values.iter().all(|v| scale.holds(*v))).unwrap_or(Scale::Linear)
+        Some(preferred.unwrap_or(default))
+            .filter(|scale| values.iter().all(|v| scale.holds(*v)))
+            .unwrap_or(Scale::Linear)
     }
 
     fn time_axis(&self) -> Axis {
@@ -330,12 +332,12 @@ impl Dependence<'_> {
     fn legend(&self, colours: &Colours) -> Vec<Entry> {
         let several = self.series.len() > 1;
         let neutral = if several { "faint" } else { "s0" };
-        let told_apart = colours.shown.iter().filter(|_| several && colours.bar.is_none());
+        let distinct = colours.shown.iter().filter(|_| several && colours.bar.is_none());
         let label = |series: &Series| match series.law() {
             Some(fit) => format!("{}: p = {}", series.label, fit.exponent.shown()),
             None => series.label.clone(),
         };
-        let series = told_apart.map(|(i, class)| Entry::new(class, LegendMark::Marker(*i), &label(&self.series[*i])));
+        let series = distinct.map(|(i, class)| Entry::new(class, LegendMark::Marker(*i), &label(&self.series[*i])));
         let any = |has: &dyn Fn(&DependencePoint) -> bool, mark: LegendMark, label: &str| {
             self.levels().any(has).then(|| Entry::new(neutral, mark, label))
         };

@@ -1,4 +1,4 @@
-//! How times are distributed: a box for each cell, and its quantiles against those of two laws.
+//! How times are distributed: a box for each cell, and its quantiles against those of two distributions.
 //!
 //! The boxes are quantiles by Kaplan and Meier, as far as these are known: none is drawn beyond the last time that
 //! members are known to have reached. The pointer on a box shows its numbers.
@@ -11,7 +11,7 @@ use crate::{
     chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, nothing},
     medium::Medium,
     svg::{Svg, coordinate, dots},
-    width::{SIZE, shortened, told_apart, width},
+    width::{SIZE, distinct, shortened, width},
 };
 use curvelax_base::text::significant;
 
@@ -108,7 +108,8 @@ impl TimeDistribution<'_> {
         let heading = Heading { title, sentences, legend: self.legend() };
         let of: [fn(f64) -> f64; 2] = [|t| t, f64::ln];
         let all = of.map(|of| cells.iter().map(|cell| cell.standardised(of)).collect::<Vec<_>>());
-        let groups = self.groups(&colours);
+        let mut groups = self.groups(&colours);
+        groups.retain(|(_, cells)| all.iter().any(|all| cells.iter().any(|(cell, _)| !all[*cell].is_empty())));
         // Where no quartiles are known, there is nothing to compare with a law.
         let compared = all.iter().any(|all| !all.iter().all(Vec::is_empty));
         let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, 0.0);
@@ -117,7 +118,7 @@ impl TimeDistribution<'_> {
         let (mut svg, top) = heading.begin(medium, above + boxes + FOOT + laws);
 
         let names: Vec<String> = colours.shown.iter().map(|(i, _)| cells[*i].label.clone()).collect();
-        let names = if rows > 1 { told_apart(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
+        let names = if rows > 1 { distinct(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
         let keys = if rows > 1 { *keys } else { "" };
         let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
@@ -146,8 +147,8 @@ impl TimeDistribution<'_> {
         svg.finish()
     }
 
-    /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do not
-    /// show.
+    /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do
+    /// not show.
     fn groups<'a>(&'a self, colours: &'a Colours) -> Vec<(&'a str, Vec<&'a (usize, String)>)> {
         let Some(crossed) = &self.key.crossed else { return vec![("", colours.shown.iter().collect())] };
         let of = |pattern: usize| {
@@ -172,20 +173,19 @@ impl TimeDistribution<'_> {
         };
         let points: Vec<(f64, f64)> = all.iter().flat_map(own).collect();
         let normal = Axis::over("standard normal quantile", "", Scale::Linear, points.iter().map(|(z, _)| *z));
-        let axis = |all: &Vec<Vec<(f64, f64)>>| {
-            Axis::over("standardised quantile", "", Scale::Linear, own(all).into_iter().map(|(_, y)| y))
+        let axis = |name, all: &Vec<Vec<(f64, f64)>>| {
+            Axis::over(name, "", Scale::Linear, own(all).into_iter().map(|(_, y)| y))
         };
-        let upwards = [axis(&all[0]), axis(&all[1])];
+        let upwards = [axis("standardised quantile", &all[0]), axis("standardised quantile of ln", &all[1])];
         let left = upwards.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
         for (((law, all), own_axis), corner) in ["normal", "lognormal"].iter().zip(all).zip(&upwards).zip(corners) {
             let corner = corner + DVec2::new(left, HEADING);
             let size = DVec2::new(side - left, HEIGHT);
-            let law = format!("against a {law} law");
             let heading = match medium {
-                _ if name.is_empty() => law,
-                // The caption of the page says which side is which.
-                Medium::Screen => name.into(),
-                Medium::Paper(_) => format!("{name}, {law}"),
+                _ if name.is_empty() => law.to_string(),
+                // The axes say which side is which.
+                _ if medium.is_screen() => name.into(),
+                _ => format!("{name}, {law}"),
             };
             let heading = shortened(&heading, SIZE, size.x);
             let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
@@ -218,7 +218,7 @@ impl TimeDistribution<'_> {
     }
 
     fn legend(&self) -> Vec<Entry> {
-        let text = "where the quantiles of the law are, through the quartiles";
+        let text = "a normal or lognormal distribution with these quartiles";
         vec![Entry::new("faint", LegendMark::Dashed, text)]
     }
 }

@@ -9,7 +9,7 @@ use crate::{
     medium::Medium,
     svg::{Svg, coordinate, dots},
     trace,
-    width::{SIZE, told_apart, width},
+    width::{SIZE, distinct, width},
 };
 
 /// Height of a row, and of the ends of a bar.
@@ -87,7 +87,7 @@ impl MemberTimes<'_> {
         let heading = Heading { title, sentences, legend: self.legend() };
         let (mut svg, top) = heading.begin(medium, 24.0 + height + FOOT);
         let all: Vec<String> = members.iter().map(|member| member.name.clone()).collect();
-        let shown = told_apart(&all, SIZE, medium.name(NAME));
+        let shown = distinct(&all, SIZE, medium.name(NAME));
         let left = MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(names, SIZE), f64::max);
         let times = members.iter().flat_map(MemberDot::ends).chain(members.iter().map(|member| member.t));
         let across = Axis::over(quantity, TIME, scale, times);

@@ -63,7 +63,7 @@ impl FittedRates<'_> {
             (bins[0].axis(name, unit, scale), Axis::counts("members", bins.iter().map(Bins::most).max().unwrap_or(0)));
         let shown = relative && across.holds(1.0);
         let named = colours.legend(|i| &cells[i].label).filter(|_| cells.len() > 1);
-        let theory = shown.then(|| Entry::new("ink", LegendMark::Dashed, "as linear theory has it"));
+        let theory = shown.then(|| Entry::new("ink", LegendMark::Dashed, "linear theory"));
         let legend = named.chain(theory).collect();
         let sentences = vec![note.into(), middle, without, colours.sentence(cells.len())];
         let (mut svg, top) = Heading { title, sentences, legend }.begin(medium, HEIGHT + FOOT + 8.0);

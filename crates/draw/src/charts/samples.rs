@@ -357,8 +357,9 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
             .map(|labels| labels.iter().map(|label| (*label).to_owned()).collect());
         Crossed { colours, patterns, places: (0..6).map(|i| (i / 2, i % 2)).collect() }
     };
-    for (name, is_told) in [("crossed", false), ("crossed-told", true)] {
-        let key = || CellKey { name: "amplitude".into(), crossed: Some(crossed()), is_told };
+    for (name, named_elsewhere) in [("crossed", false), ("crossed-told", true)] {
+        let key =
+            || CellKey { name: "amplitude".into(), crossed: Some(crossed()), named_elsewhere, ..CellKey::default() };
         let mut boxes = quantiles(6, 1.0);
         boxes.key = key();
         add(&format!("distribution-{name}"), boxes.draw(medium));
@@ -373,7 +374,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     }
     let wide = Crossed { colours: (0..12).map(|i| i.to_string()).collect(), ..crossed() };
     let wide = Crossed { places: (0..24).map(|i| (i / 2, i % 2)).collect(), ..wide };
-    let key = CellKey { name: "amplitude".into(), crossed: Some(wide), is_told: false };
+    let key = CellKey { name: "amplitude".into(), crossed: Some(wide), ..CellKey::default() };
     let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(24, 100));
     add("survival-crossed-24", Survival { title, note, key, curves, ..Survival::default() }.draw(medium));
 

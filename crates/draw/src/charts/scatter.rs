@@ -134,7 +134,7 @@ impl Scatter<'_> {
         let several = self.cells.len() > 1 && colours.bar.is_none();
         // Panels show what colours do not.
         let cells: Vec<Entry> = match &self.key.crossed {
-            _ if !several || colours.is_told() => Vec::new(),
+            _ if !several || colours.named_elsewhere() => Vec::new(),
             Some(crossed) => {
                 let entry = |(i, label): (usize, &String)| Entry::new(&format!("s{i}"), LegendMark::Points, label);
                 crossed.colours.iter().enumerate().map(entry).collect()

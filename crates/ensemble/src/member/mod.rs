@@ -72,12 +72,12 @@ pub struct Member {
     pub origin: DVec2,
     /// How its corners were rounded off; only outlines sampled by arclength can need it.
     pub mollified: Mollified,
-    /// The excess of its outline before corners were rounded off, if they were: a share of the excess at the start is one of
-    /// this.
+    /// The excess of its outline before corners were rounded off, if they were: a share of the excess at the start is
+    /// one of this.
     pub given_excess: Option<f64>,
     /// Its law of motion, if each member has its own; otherwise that of the spec.
     pub flow: Option<Flow>,
-    /// What acts beside it, if each member has values of its own; otherwise that of the spec.
+    /// What acts besides it, if each member has values of its own; otherwise that of the spec.
     pub forcing: Option<Forcing>,
     /// The numbers that were drawn for it, in the order of [`Family::drawn`].
     pub drawn: Vec<f64>,
@@ -132,7 +132,7 @@ struct MemberCurve {
     factor: RadialFactor,
     /// Its law of motion, if it is not that of all.
     flow: Option<Flow>,
-    /// What acts beside it, if members have values of their own.
+    /// What acts besides it, if members have values of their own.
     forcing: Option<Forcing>,
     /// How the perturbed curve is stretched.
     stretch: Option<Stretch>,
@@ -167,8 +167,8 @@ impl Family {
         Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(curves.into()), None)
     }
 
-    /// Does the same as [`Family::new`], with `curve` in place of the shape, for all members: for curves that no `--shape`
-    /// can name.
+    /// Does the same as [`Family::new`], with `curve` in place of the shape, for all members: for curves that no
+    /// `--shape` can name.
     ///
     /// ```
     /// use curvelax_curve::BaseCurve;

@@ -1,17 +1,17 @@
 //! Corners that n nodes cannot resolve are rounded off for these nodes before a run, as little as needed.
 //!
-//! The curve of an outline has [rounded corners](super::outline_curve) that enough nodes resolve. Fewer nodes can turn by up
-//! to π there. The scheme's first steps then merge the nodes, whatever τ is. An
-//! outline sampled by arclength therefore goes through rounds of `(I + κ D⁴) x_new = x_old`, where `D⁴` is the periodic
-//! fourth difference in the node index (an implicit step of surface diffusion of duration `κ·spacing⁴`). After each
-//! round the nodes are spaced equally again. The rounds end when no node turns by more than [`MAX_VERTEX_TURN`].
-//! Without the new spacing, nodes would crowd at a tip, and a sharp one would need hundreds of rounds. The effect
-//! reaches a few spacings far, so it vanishes as n grows.
+//! The curve of an outline has [rounded corners](super::outline_curve) that enough nodes resolve. Fewer nodes can turn
+//! by up to π there. The scheme's first steps then merge the nodes, whatever τ is. An outline sampled by arclength
+//! therefore goes through rounds of `(I + κ D⁴) x_new = x_old`, where `D⁴` is the periodic fourth difference in the
+//! node index (an implicit step of surface diffusion of duration `κ·spacing⁴`). After each round the nodes are spaced
+//! equally again. The rounds end when no node turns by more than [`MAX_VERTEX_TURN`]. Without the new spacing, nodes
+//! would crowd at a tip, and a sharp one would need hundreds of rounds. The effect reaches a few spacings far, so it
+//! vanishes as n grows.
 //!
 //! Times go as the fourth power of the size, so a lost per cent of the area costs two per cent of the time. Nodes that
-//! were changed are therefore scaled about their centroid until they enclose the area of the outline itself, not that of
-//! the polygon through the nodes before, which depends on where the nodes were. The rounds and the change of area before
-//! scaling are reported. Nodes that cross themselves are not scaled: their area is a difference.
+//! were changed are therefore scaled about their centroid until they enclose the area of the outline itself, not that
+//! of the polygon through the nodes before, which depends on where the nodes were. The rounds and the change of area
+//! before scaling are reported. Nodes that cross themselves are not scaled: their area is a difference.
 //!
 //! A part of the outline that is thinner than the spacing rules out equal spacing, small turns and no crossing at once.
 //! The rounds then stop before the first crossing, and the problem is reported. If parts of the outline at least four
@@ -70,8 +70,8 @@ impl Mollified {
 }
 
 /// Rounds off the corners of `nodes` (n ≥ 6) where they are too sharp for the scheme. `simple` says that the outline
-/// does not cross itself, so the nodes should not either. `area` computes the outline's own signed area, which nodes that
-/// were changed get back.
+/// does not cross itself, so the nodes should not either. `area` computes the outline's own signed area, which nodes
+/// that were changed get back.
 pub fn mollify(nodes: &mut Vec<DVec2>, area: impl FnOnce() -> f64, simple: bool) -> Mollified {
     let crosses = |nodes: &[DVec2]| simple && crossing(nodes).is_some();
     let sharp = |nodes: &[DVec2]| sharpest_turn(nodes) > MAX_VERTEX_TURN;
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_that_cross_are_told_from_an_outline_that_does() {
+    fn nodes_that_cross_are_distinguished_from_an_outline_that_does() {
         let bow = |n: i32| {
             let corners = [(0.0, 0.0), (3.0, 3.0), (3.0, 0.0), (0.0, 1.0)].map(DVec2::from);
             (0..4 * n).map(move |i| {

@@ -1,18 +1,21 @@
-//! From the points of an outline to the curve that is perturbed and sampled: interpolation, and corners that are rounded off.
+//! From the points of an outline to the curve that is perturbed and sampled: interpolation, and corners that are
+//! rounded off.
 //!
-//! Neither depends on the nodes of a member, so times at more and more nodes have a limit: that of this curve. What rounding
-//! and the points themselves do to a time is measured by other curves of the same outline, its [variations](Variation).
+//! Neither depends on the nodes of a member, so times at more and more nodes have a limit: that of this curve. What
+//! rounding and the points themselves do to a time is measured by other curves of the same outline, its
+//! [variations](Variation).
 //!
-//! Corners are rounded on many more nodes than members have, `KNOTS` on the radius that no corner is to be sharper than, by
-//! rounds of an implicit step of `x_t = -x_ssss` and equal spacing, as in [`mollifier`](super::mollifier). A step moves
-//! points near corners only: a smooth arc of radius r by the share `(radius/r)⁴`. The nodes are scaled about their centroid
-//! until they enclose the area of the outline again, and a spline through them is the curve. Outlines without corners are
-//! left as they are, however sharp a smooth tip may be: its shape is given by points.
+//! Corners are rounded on many more nodes than members have, `KNOTS` on the radius that no corner is to be sharper
+//! than, by rounds of an implicit step of `x_t = -x_ssss` and equal spacing, as in [`mollifier`](super::mollifier). A
+//! step moves points near corners only: a smooth arc of radius r by the share `(radius/r)⁴`. The nodes are scaled about
+//! their centroid until they enclose the area of the outline again, and a spline through them is the curve. Outlines
+//! without corners are left as they are, however sharp a smooth tip may be: its shape is given by points.
 //!
-//! Equal steps of `-x_ssss` take area away at a corner, with the cube of its curvature. Each round gives that back where it was,
-//! spread over about twice the radius, as surface diffusion would not have taken it: what is left of rounding is then a few
-//! times smaller. The length is not given back. A share of the excess at the start, `--relax-to`, is therefore one of the
-//! excess of the outline before its corners are rounded: for a coast that is most of it.
+//! Equal steps of `-x_ssss` take area away at a corner, with the cube of its curvature. Each round gives that back
+//! where it was, spread over about twice the radius, as surface diffusion would not have taken it: what is left of
+//! rounding is then a few times smaller. The length is not given back. A share of the excess at the start,
+//! `--relax-to`, is therefore one of the excess of the outline before its corners are rounded: for a coast that is most
+//! of it.
 
 use std::{f64::consts::PI, sync::Arc};
 
@@ -129,8 +132,8 @@ impl Treatment {
     }
 }
 
-/// The curve with corners rounded to a radius of at least `share` of its length, and the relative change of area that was put
-/// back. Rounds end before the first crossing.
+/// The curve with corners rounded to a radius of at least `share` of its length, and the relative change of area that
+/// was put back. Rounds end before the first crossing.
 fn rounded(curve: &BaseCurve, outline: &Arc<Outline>, share: f64) -> (BaseCurve, f64) {
     let knots = (KNOTS / share).ceil() as usize;
     let Ok(sampler) = Sampler::new(curve.clone(), Sampling::Arclength, knots) else { return (curve.clone(), 0.0) };
@@ -160,7 +163,8 @@ fn rounded(curve: &BaseCurve, outline: &Arc<Outline>, share: f64) -> (BaseCurve,
     (through(&nodes), area_change)
 }
 
-/// The nodes `after` a step, moved along their normals so that the area that the step took away comes back where it did.
+/// The nodes `after` a step, moved along their normals so that the area that the step took away comes back where it
+/// did.
 fn with_local_area(before: &[DVec2], after: Vec<DVec2>) -> Vec<DVec2> {
     let n = after.len();
     // Outward, as long as the part of the curve that belongs to a node.

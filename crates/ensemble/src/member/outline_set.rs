@@ -29,7 +29,8 @@ impl OutlineSet {
     }
 }
 
-/// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each member.
+/// Outlines of which the curves are kept: that of a rough one takes about 100 kB. Those of more are made for each
+/// member.
 const KEPT: usize = 256;
 
 /// The curves of the outlines of a set, each made when it is first needed.

@@ -22,8 +22,8 @@ pub struct Outlines {
 }
 
 impl Outlines {
-    /// Those of `spec` and its sweep: from `known` if it has them, and otherwise read from files, whose paths are relative
-    /// to the directory `base`.
+    /// Those of `spec` and its sweep: from `known` if it has them, and otherwise read from files, whose paths are
+    /// relative to the directory `base`.
     ///
     /// # Errors
     /// [`Error::Request`] for everything that [`Shape::outlines_from`] refuses.
@@ -101,8 +101,8 @@ impl Outlines {
     /// else, one copy of each, as it is.
     ///
     /// # Errors
-    /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys that
-    /// mean nothing with outlines, or only with them.
+    /// [`Error::Request`] for cells with unequal numbers of outlines, for another number than `spec` has, and for keys
+    /// that mean nothing with outlines, or only with them.
     pub(crate) fn settle(&self, mut spec: Spec) -> Result<Spec> {
         self.settle_curves(&mut spec)?;
         let several = |(shape, set): &&(Shape, Arc<OutlineSet>)| matches!(shape, Shape::Files(_)) || set.all.len() > 1;

@@ -1,7 +1,7 @@
 //! The stretch of a curve along its principal axes, at constant area, to a given reduced area 4πA/L².
 //!
-//! By a factor e^s along the longer axis and e^-s across it the length is a convex function of s, so that it has one minimum. The
-//! s beyond that at which it is the wanted one is found by halving.
+//! By a factor e^s along the longer axis and e^-s across it the length is a convex function of s, so that it has one
+//! minimum. The s beyond that at which it is the wanted one is found by halving.
 
 use std::f64::consts::PI;
 

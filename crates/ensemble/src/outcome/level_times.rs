@@ -109,8 +109,8 @@ impl LevelTimes {
         self.place(RefinementLevel::FULL, member).is_some()
     }
 
-    /// Whether `member`, of a cell of `spec`, is to run at `level`, one of the finer ones, by its own times at those below:
-    /// it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more).
+    /// Whether `member`, of a cell of `spec`, is to run at `level`, one of the finer ones, by its own times at those
+    /// below: it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more).
     ///
     /// At the level of a variation it is to run if it has its finest time there, whose limit that will be.
     pub fn needs(&self, spec: &Spec, member: u64, level: RefinementLevel) -> bool {
@@ -162,7 +162,8 @@ impl LevelTimes {
         levels.last().copied().filter(|_| levels.contains(&RefinementLevel::FULL))
     }
 
-    /// By how much a variation of its outline moves the time of a member, at its finest level; unknown if it did not run.
+    /// By how much a variation of its outline moves the time of a member, at its finest level; unknown if it did not
+    /// run.
     fn moved_by(&self, member: u64, variation: Variation) -> Option<f64> {
         let finest = self.finest(member)?;
         let [varied, own] = [finest.varied(variation), finest].map(|level| self.time(level, member));
@@ -197,8 +198,8 @@ impl LevelTimes {
     }
 }
 
-/// The largest turn at a node, as that of a plain curve that is resolved as well. The pilot, which only estimates, goes by that of
-/// the tangent.
+/// The largest turn at a node, as that of a plain curve that is resolved as well. The pilot, which only estimates, goes
+/// by that of the tangent.
 fn turn(spec: &Spec, at: &AtLevel) -> f64 {
     if spec.refine { spec.turns() * at.turn } else { at.turn }
 }

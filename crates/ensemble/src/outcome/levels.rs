@@ -2,10 +2,10 @@
 //! relaxation times follows.
 //!
 //! The members of a level are those of a cell, with the same random numbers; they run before the cell does. With
-//! `--refine` all members run at the [first three](RefinementLevel::FIRST), those whose times do not converge there also at
-//! finer ones, and each gets its [limit](curvelax_statistics::Limit). Of outlines, [variations](Variation) run at the finest
-//! level of each, too, which tell what rounding and points do to its time. Otherwise a few of them run at the first three, the
-//! pilot, and tell the error of a typical member.
+//! `--refine` all members run at the [first three](RefinementLevel::FIRST), those whose times do not converge there
+//! also at finer ones, and each gets its [limit](curvelax_statistics::Limit). Of outlines, [variations](Variation) run
+//! at the finest level of each, too, which tell what rounding and points do to its time. Otherwise a few of them run at
+//! the first three, the pilot, and tell the error of a typical member.
 
 use crate::{
     Outcome, Spec, Status, Variation,
@@ -22,15 +22,15 @@ const PILOT_SHARE: u64 = 16;
 /// Nodes above which a single member takes so long that there is a pilot only if it is asked for, by `--refine`.
 const MAX_PILOT_POINTS: usize = 10_000;
 /// Most nodes of a level finer than the member itself.
-const MOST_POINTS: usize = 1600;
+const MAX_POINTS: usize = 1600;
 /// How much later a level ends, and the latest time at all.
 const LONGER: f64 = 2.0;
 const LATEST: f64 = 1e300;
 /// Tolerance of the steps of a level beside fixed ones.
 const EXACT: f64 = 1e-4;
 
-/// A resolution at which members run besides their own, by its step from 1: step l of n nodes has n·2^((l - 3)/2). Variations
-/// of outlines run at the same ones.
+/// A resolution at which members run besides their own, by its step from 1: step l of n nodes has n·2^((l - 3)/2).
+/// Variations of outlines run at the same ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RefinementLevel {
     step: u32,
@@ -67,7 +67,7 @@ impl RefinementLevel {
     /// The levels of members with `n` nodes that are finer than these, in the order in which they run.
     pub fn finer(n: usize) -> impl Iterator<Item = RefinementLevel> {
         let all = (RefinementLevel::FULL.step + 1..=RefinementLevel::MOST as u32).map(RefinementLevel::plain);
-        all.take_while(move |level| level.points(n) <= MOST_POINTS)
+        all.take_while(move |level| level.points(n) <= MAX_POINTS)
     }
 
     /// The level with this number, if there is one.

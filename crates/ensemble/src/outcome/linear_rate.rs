@@ -9,8 +9,8 @@
 //! ```
 //!
 //! since the excess scales as the square of the mode's amplitude over the radius, and rate_m is that of the amplitude
-//! ([`Flow::linear_rate`]). R starts as that of the circle of the initial area. The excess is matched where it is known,
-//! at t_relax or t_half, and the rate is the slope of the least-squares line through the window of the fit.
+//! ([`Flow::linear_rate`]). R starts as that of the circle of the initial area. The excess is matched where it is
+//! known, at t_relax or t_half, and the rate is the slope of the least-squares line through the window of the fit.
 
 use crate::{MemberValues, Outcome, Spec};
 use curvelax_flow::flow::Flow;
@@ -151,7 +151,7 @@ impl Decline<'_> {
     }
 }
 
-/// A circle on its way.
+/// A circle while it grows.
 #[derive(Clone, Copy)]
 struct Point {
     t: f64,

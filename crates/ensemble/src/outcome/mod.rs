@@ -6,8 +6,8 @@ mod level_times;
 pub mod levels;
 pub mod linear_rate;
 pub mod rows;
+mod run_progress;
 mod sink;
-mod standing;
 mod wulff;
 
 use glam::DVec2;
@@ -21,8 +21,8 @@ pub use features::{Feature, Features};
 pub use level_times::LevelTimes;
 pub use levels::{LevelRow, RefinementLevel};
 pub use rows::{Extent, Rows};
-pub use sink::{Sink, Wish};
-pub use standing::{Paused, Standing};
+pub use run_progress::{Paused, RunProgress};
+pub use sink::{Sink, SinkRequest};
 pub use wulff::{wulff_distance, wulff_outline};
 
 /// Scalar observables of one curve at one time (f64 whatever the precision of the run).

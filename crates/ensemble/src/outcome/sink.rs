@@ -1,11 +1,11 @@
 //! Where a run sends the results of its members, and what it asks between two dispatches.
 
-use crate::{Ended, Extent, LevelRow, Rows, SeriesRow, Snapshot, Standing};
+use crate::{Ended, Extent, LevelRow, Rows, RunProgress, SeriesRow, Snapshot};
 use curvelax_base::error::{Error, Result};
 
 /// What a sink wants from a run between two dispatches.
 #[derive(Debug)]
-pub enum Wish {
+pub enum SinkRequest {
     /// Continue.
     Continue,
     /// Report a checkpoint, then continue.
@@ -18,7 +18,8 @@ pub enum Wish {
 pub trait Sink {
     /// A member has ended; called exactly once per member, in member order.
     fn member(&mut self, ended: &Ended) -> Result<()>;
-    /// A member has ended at a [level](crate::RefinementLevel): before the members themselves, level by level in member order.
+    /// A member has ended at a [level](crate::RefinementLevel): before the members themselves, level by level in member
+    /// order.
     fn level(&mut self, _row: &LevelRow) -> Result<()> {
         Ok(())
     }
@@ -33,11 +34,11 @@ pub trait Sink {
         Ok(())
     }
     /// What the sink wants now; asked after every dispatch, and during long ones.
-    fn wish(&mut self) -> Wish {
-        Wish::Continue
+    fn next_request(&mut self) -> SinkRequest {
+        SinkRequest::Continue
     }
     /// Receives the progress of the run: on request, or when the run fails.
-    fn checkpoint(&mut self, _standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, _progress: &RunProgress) -> Result<()> {
         Ok(())
     }
 }

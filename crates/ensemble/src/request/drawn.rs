@@ -301,8 +301,8 @@ const TRIED: u64 = 256;
 /// Corners of the support that are tried.
 const MAX_CORNERS: usize = 4096;
 
-/// Why a member could be refused, if the distributions can give numbers that are `refused`: inside their support, or at its
-/// corners.
+/// Why a member could be refused, if the distributions can give numbers that are `refused`: inside their support, or at
+/// its corners.
 pub(crate) fn refusal(of: &[&Distribution], refused: impl Fn(&[f64]) -> Option<String>) -> Option<String> {
     if of.is_empty() {
         return None;

@@ -209,19 +209,7 @@ impl fmt::Display for Event {
     }
 }
 
-impl TryFrom<String> for Event {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Event, String> {
-        text.parse()
-    }
-}
-
-impl From<Event> for String {
-    fn from(event: Event) -> String {
-        event.to_string()
-    }
-}
+curvelax_base::as_text!(Event);
 
 #[cfg(test)]
 mod tests {

@@ -1,7 +1,7 @@
 //! The keys of a spec, each in one place: its name in spec files and as a flag, its type, its default, and its help.
 //!
-//! A new key is a line of the table below. Flags, their help, docs/flags.md, the keywords of Python and the swept keys follow;
-//! [`Spec::validate`] checks its range, and whoever needs its value asks the [`Spec`].
+//! A new key is a line of the table below. Flags, their help, docs/flags.md, the keywords of Python and the swept keys
+//! follow; [`Spec::validate`] checks its range, and whoever needs its value asks the [`Spec`].
 
 use std::fmt;
 
@@ -97,8 +97,8 @@ const fn hyphenated<const N: usize>(name: &str) -> [u8; N] {
     bytes
 }
 
-/// Defines the spec, its default, and [`Spec::KEYS`] from a table with lines `key: TYPE = DEFAULT, "VALUE", GROUP;` whose
-/// comments are the help. `or "TEXT"` is the value of a flag without one. What is no key follows.
+/// Defines the spec, its default, and [`Spec::KEYS`] from a table with lines `key: TYPE = DEFAULT, "VALUE", GROUP;`
+/// whose comments are the help. `or "TEXT"` is the value of a flag without one. What is no key follows.
 macro_rules! keys {
     (
         $(#[$of_spec:meta])*
@@ -157,8 +157,8 @@ keys! {
     #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
     #[allow(rustdoc::broken_intra_doc_links)] // the brackets of a grammar
     pub struct Spec {
-        /// Number of members. Of outlines, the number of copies of each, perturbed by --amplitude; of files:PATTERN without the
-        /// flag, each runs once, unperturbed [default: 256]
+        /// Number of members. Of outlines, the number of copies of each, perturbed by --amplitude; of files:PATTERN
+        /// without the flag, each runs once, unperturbed [default: 256]
         curves: u64 = 256, "COUNT", Ensemble;
         /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -172,18 +172,19 @@ keys! {
         /// Seed of the random perturbations [default: 1]
         #[serde(with = "seed")]
         seed: u64 = 1, "SEED", Ensemble;
-        /// Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the outlines in
-        /// file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are relative to the current
-        /// folder. Any number may be a distribution, such as uniform(1.2..3): see below [default: ellipse:2,1]
+        /// Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the
+        /// outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are
+        /// relative to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below
+        /// [default: ellipse:2,1]
         shape: Drawn<Shape> = Shape::Ellipse { a: 2.0, b: 1.0 }.into(), "SHAPE", Ensemble;
         /// Placement of the nodes on the curve [default: arclength]
         sampling: Sampling = Sampling::Arclength, "HOW", Ensemble;
-        /// How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline with corners
-        /// where the direction turns by more than half a radian [default: auto]
+        /// How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline
+        /// with corners where the direction turns by more than half a radian [default: auto]
         #[serde(skip_serializing_if = "Option::is_none")]
         interpolate: Option<Interpolation> = None, "HOW", Ensemble;
-        /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0 leaves them
-        /// to the nodes [default: 0.002]
+        /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
+        /// leaves them to the nodes [default: 0.002]
         #[serde(skip_serializing_if = "Option::is_none")]
         rounding: Option<f64> = None, "SHARE", Ensemble;
         /// Size σ of the random perturbation, 0 for none; or a distribution [default: 0.05]
@@ -192,45 +193,45 @@ keys! {
         modes: Modes = Modes { low: 2, high: 8 }, "LO..=HI", Ensemble;
         /// Power p: mode m has standard deviation σ m^-p; or a distribution [default: 1]
         decay: Drawn<f64> = 1.0.into(), "P", Ensemble;
-        /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi A/L^2, 0.05 to
-        /// 1; or a distribution. Needs --conserve area,length [default: as it is]
+        /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi
+        /// A/L^2, 0.05 to 1; or a distribution. Needs --conserve area,length [default: as it is]
         #[serde(skip_serializing_if = "Option::is_none")]
         reduced_area: Option<Drawn<f64>> = None, "V", Ensemble;
-        /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos and
-        /// sin with the same power [default: amplitude-phase]
+        /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of
+        /// cos and sin with the same power [default: amplitude-phase]
         #[serde(skip_serializing_if = "Perturbation::is_default")]
         perturbation: Perturbation = Perturbation::default(), "LAW", Ensemble;
-        /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity, --drive,
-        /// --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a Latin hypercube. The modes of the perturbation stay random
-        /// [default: random]
+        /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity,
+        /// --drive, --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a
+        /// Latin hypercube. The modes of the perturbation stay random [default: random]
         #[serde(skip_serializing_if = "Design::is_random")]
         design: Design = Design::default(), "DESIGN", Ensemble;
         /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions
         /// [default: surface-diffusion]
         flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", Evolution;
-        /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is 1 +
-        /// EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may be a
-        /// distribution [default: 1]
+        /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG]
+        /// is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any
+        /// number may be a distribution [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         energy: Option<Drawn<Energy>> = None, "GAMMA", Evolution;
-        /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ - DEG), above
-        /// 0 in all directions; a sum of two as for --energy [default: 1]
+        /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
+        /// DEG), above 0 in all directions; a sum of two as for --energy [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         diffusivity: Option<Drawn<Diffusivity>> = None, "M", Evolution;
-        /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface diffusion has
-        /// R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any number may be a distribution
-        /// [default: 0]
+        /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
+        /// diffusion has R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any
+        /// number may be a distribution [default: 0]
         #[serde(skip_serializing_if = "Option::is_none")]
         drive: Option<Drawn<Drive>> = None, "F", Evolution;
-        /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a vesicle: it is
-        /// relaxed when --relax-to of the way of its energy is left [default: neither]
+        /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
+        /// vesicle: it is relaxed when --relax-to of the way of its energy is left [default: neither]
         #[serde(skip_serializing_if = "Option::is_none")]
         conserve: Option<Conserved> = None, "WHAT", Evolution;
         /// The area and the length that are kept; one number if one is [default: those of the polygon at the start]
         #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
         conserve_at: Option<Vec<f64>> = None, "A,L", Evolution;
-        /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in results,
-        /// are then in its unit of time [default: 1]
+        /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
+        /// results, are then in its unit of time [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         mobility: Option<f64> = None, "B", Evolution;
         /// Names of the units of length and time, such as um,h, for the report and the axes [default: none]
@@ -239,12 +240,13 @@ keys! {
         /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
         #[serde(skip_serializing_if = "Option::is_none")]
         tau: Option<Tau> = None, "TAU", Evolution;
-        /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL before
-        /// SPEC.toml [default: off]
+        /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL
+        /// before SPEC.toml [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         adaptive: Option<f64> = None, "TOL", Evolution, or "0.001";
-        /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
-        /// predicts for its cell; if --drive makes it vanish, when it has. T1,T2,...: one for each cell of a sweep [default: 2]
+        /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear
+        /// theory predicts for its cell; if --drive makes it vanish, when it has. T1,T2,...: one for each cell of a
+        /// sweep [default: 2]
         #[serde(skip_serializing_if = "Option::is_none")]
         t_end: Option<FinalTime> = None, "T", Evolution;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
@@ -253,17 +255,19 @@ keys! {
         omega: Option<Omega> = None, "OMEGA", Evolution;
         /// Move nodes along the normal only [default: false]
         no_redistribution: bool = false, "BOOL", Evolution;
-        /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of the
-        /// polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
+        /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of
+        /// the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
         pull: Pull = Pull::Rate(0.0), "KAPPA", Method;
-        /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force of the
-        /// polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
+        /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the
+        /// force of the polygon itself, which halves the error of smooth, well resolved curves and fails for others;
+        /// auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
         #[serde(skip_serializing_if = "Option::is_none")]
         form: Option<PositionForm> = None, "FORM", Method;
-        /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default: auto]
+        /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default:
+        /// auto]
         solver: SolverChoice = SolverChoice::Auto, "SOLVER", Method;
-        /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU needs it;
-        /// lexicographic: one after another [default: coloured]
+        /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU
+        /// needs it; lexicographic: one after another [default: coloured]
         order: Order = Order::Coloured, "ORDER", Method;
         /// Residual tolerance at which Gauss-Seidel sweeps stop [default: 1e-3 in f32, 1e-5 in f64]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -284,29 +288,31 @@ keys! {
         /// Count a member as relaxed at this fraction of its initial excess [default: 0.01]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_to: Option<f64> = None, "FRACTION", Evolution;
-        /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of --relax-to.
-        /// Use it for rough outlines [default: off]
+        /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of
+        /// --relax-to. Use it for rough outlines [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_at: Option<f64> = None, "EXCESS", Evolution;
-        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there [default: false; with --t-end
-        /// auto true]
+        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there [default: false; with
+        /// --t-end auto true]
         #[serde(skip_serializing_if = "Option::is_none")]
         stop_when_relaxed: Option<bool> = None, "BOOL", Evolution;
-        /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n → ∞:
-        /// columns t_limit, t_error, order and points of summary.csv. Members whose times do not converge there also run with
-        /// √2 n, 2n, … up to 1600 nodes [default: false]
+        /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n
+        /// → ∞: columns t_limit, t_error, order and points of summary.csv. Members whose times do not converge there
+        /// also run with √2 n, 2n, … up to 1600 nodes [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         refine: bool = false, "BOOL", Evolution;
-        /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling and
-        /// discretisation together, is within X times the median. For outlines, whose number is given: n and the tolerance so
-        /// that each t_error is within X times t_limit. It starts from --curves, --points and --adaptive. If X cannot be reached,
-        /// the run keeps its best result and exits with code 3. Needs --refine [default: off]
+        /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for
+        /// sampling and discretisation together, is within X times the median. For outlines, whose number is given: n
+        /// and the tolerance so that each t_error is within X times t_limit. It starts from --curves, --points and
+        /// --adaptive. If X cannot be reached, the run keeps its best result and exits with code 3. Needs --refine
+        /// [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         accuracy: Option<f64> = None, "X", Evolution;
-        /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A level
-        /// is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio (longest over
-        /// shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For several events give it several times: --event 'convex = k_min >= 0' --event
-        /// 'slow = excess <= 0.5 * start' [default: none]
+        /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL.
+        /// A level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
+        /// (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments).
+        /// For several events give it several times: --event 'convex = k_min >= 0' --event 'slow = excess <= 0.5 *
+        /// start' [default: none]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         event: Vec<Event> = Vec::new(), "NAME=CONDITION", Output;
         /// Write series.csv: one row per member every DT [default: off]
@@ -324,7 +330,8 @@ keys! {
         /// Run only these members; each is bit-identical to its run in the whole ensemble [default: all]
         #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
         only: Option<Vec<u64>> = None, "J1,J2,...", Ensemble;
-        /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array [default: all]
+        /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array
+        /// [default: all]
         #[serde(skip_serializing_if = "Option::is_none")]
         shard: Option<Shard> = None, "I/N", Ensemble;
         /// Threads of the CPU back end [default: all cores]
@@ -333,14 +340,15 @@ keys! {
         /// Draw member j of every cell from the same random numbers [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         common_random_numbers: bool = false, "BOOL", Ensemble;
-        /// Vary this key: a cell of members for each value, and for each combination if the flag is given for several keys.
-        /// Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default: none]
+        /// Vary this key: a cell of members for each value, and for each combination if the flag is given for several
+        /// keys. Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default:
+        /// none]
         #[serde(skip_serializing_if = "Sweep::is_empty")]
         sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", Ensemble;
     }
     besides {
-        /// Highest order of adaptive steps; if absent, that of the precision. Only the study of work and precision sets it, to
-        /// measure what every order costs.
+        /// Highest order of adaptive steps; if absent, that of the precision. Only the study of work and precision sets
+        /// it, to measure what every order costs.
         most_order: Option<u32> = None;
         /// Keys that the request leaves out.
         omitted: OmittedKeys = OmittedKeys::default();

@@ -45,7 +45,7 @@ impl Spec {
             curves: given.curves.is_none(),
             amplitude: given.amplitude.is_none(),
         });
-        let spec: Spec = toml::from_str(text).map_err(|e| format!("{}{}", told(&e), suggestion(e.message())))?;
+        let spec: Spec = toml::from_str(text).map_err(|e| format!("{}{}", in_words(&e), suggestion(e.message())))?;
         Ok(Spec { omitted, ..spec })
     }
 
@@ -68,7 +68,7 @@ const MAX_LINE: usize = 300;
 const MAX_SHOWN: usize = 1000;
 
 /// What is wrong, with the line and a caret; for an overlong line, only where.
-fn told(error: &toml::de::Error) -> String {
+fn in_words(error: &toml::de::Error) -> String {
     let whole = error.to_string();
     let (whole, message) = (whole.trim_end(), error.message().trim_end());
     let problem = shortened(&plainly(message), MAX_SHOWN);
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_line_without_end_only_the_place_is_told() {
+    fn the_error_for_an_overlong_line_has_its_place_only() {
         let long = "x".repeat(100_000);
         for (text, start) in [
             (format!("\nshape = '{long}'"), "TOML parse error at line 2, column 9: unknown shape `xxx"),

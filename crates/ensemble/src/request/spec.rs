@@ -31,10 +31,11 @@ const TIMED: [&str; 4] = ["tau", "t-end", "omega", "pull"];
 pub const DEFAULT_T_END: f64 = 2.0;
 /// The paper's ω.
 pub const DEFAULT_OMEGA: f64 = 1.0;
-/// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve it from
-/// about 2/share on, 1000; a run adds up to 1600 by itself.
+/// Smallest radius of curvature of a corner, as a share of the length of its outline, if none is given. Nodes resolve
+/// it from about 2/share on, 1000; a run adds up to 1600 by itself.
 pub const DEFAULT_ROUNDING: f64 = 0.002;
-/// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an outline.
+/// Shares that can be asked for: below, nodes by the ten thousand would be needed; above, little would be left of an
+/// outline.
 pub const ROUNDINGS: std::ops::RangeInclusive<f64> = 1e-4..=0.02;
 /// Tolerance of `--adaptive` without a value.
 pub const DEFAULT_ADAPTIVE: f64 = 1e-3;
@@ -231,14 +232,14 @@ impl Spec {
         }
     }
 
-    /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do not
-    /// resolve the curve, and intervals of limits were calibrated with this one. For crystals and forced
-    /// curves there is no other.
+    /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do
+    /// not resolve the curve, and intervals of limits were calibrated with this one. For crystals and forced curves
+    /// there is no other.
     pub fn is_geometric(&self) -> bool {
         self.form == Some(PositionForm::Geometric) || self.has_crystals() || self.is_forced()
     }
 
-    /// Whether a force acts beside the flow, or something is kept.
+    /// Whether a force acts besides the flow, or something is kept.
     pub fn is_forced(&self) -> bool {
         self.drive.is_some() || self.conserve.is_some()
     }
@@ -248,22 +249,27 @@ impl Spec {
         self.energy.is_some() || self.diffusivity.is_some()
     }
 
-    /// Whether relaxation times have limits n → ∞ that intervals hold: not where the end is known only when it is reached, nor
-    /// where members are followed until they vanish, whose t_vanish has none.
+    /// Whether relaxation times have limits n → ∞ that intervals hold: not where the end is known only when it is
+    /// reached, nor where members are followed until they vanish, whose t_vanish has none.
     pub fn can_refine(&self) -> bool {
         !(self.keeps_both() || self.is_driven_inwards() || self.sweep.has("drive"))
     }
 
-    /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ and M turns m
-    /// times as fast as the tangent, and that of the highest one must be resolved, too; where the length is kept, it is
-    /// measured.
+    /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ
+    /// and M turns m times as fast as the tangent, and that of the highest one must be resolved, too; where the length
+    /// is kept, it is measured.
     pub(crate) fn turns(&self) -> f64 {
         if self.conserve == Some(Conserved::Length) {
             return LENGTH_TURNS;
         }
+        self.highest_wave().unwrap_or(1).max(1).into()
+    }
+
+    /// The highest wave of γ and M.
+    pub(crate) fn highest_wave(&self) -> Option<u32> {
         let energy = self.energy.as_ref().and_then(|of| of.typical().waves().highest_mode());
         let diffusivity = self.diffusivity.as_ref().and_then(|of| of.typical().waves().highest_mode());
-        energy.max(diffusivity).unwrap_or(1).max(1).into()
+        energy.max(diffusivity)
     }
 
     /// The excess at which a member that starts with `excess` counts as relaxed.

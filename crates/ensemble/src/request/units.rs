@@ -48,19 +48,7 @@ impl fmt::Display for Units {
     }
 }
 
-impl From<Units> for String {
-    fn from(units: Units) -> String {
-        units.to_string()
-    }
-}
-
-impl TryFrom<String> for Units {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Units, String> {
-        text.parse()
-    }
-}
+curvelax_base::as_text!(Units);
 
 impl FromStr for Units {
     type Err = String;

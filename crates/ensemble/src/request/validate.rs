@@ -3,24 +3,19 @@
 //! The shape, the sampling and the perturbation are checked where they are built (`Family::new`), because that needs
 //! the file of the shape. Only the resolution of the highest mode is checked here.
 
-use std::f64::consts::PI;
+mod forces;
+mod times;
 
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
-    BackendChoice, DEFAULT_ADAPTIVE, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm,
-    Precision, Pull, ROUNDINGS, Sor, Spec, Store, Tau, final_times,
+    BackendChoice, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm, Precision, Pull,
+    ROUNDINGS, Sor, Spec, Store, Tau,
 };
-use crate::request::values::check_reduced_area;
 use curvelax_base::{
     error::{Error, Result},
     text::{count, number},
 };
-use curvelax_curve::Sampling;
-use curvelax_flow::{
-    flow::Flow,
-    forcing::Conserved,
-    solver::{Facts, ring::MIN_POINTS},
-};
+use curvelax_flow::solver::{Facts, ring::MIN_POINTS};
 
 /// More members than this are a typing error.
 const MAX_CURVES: u64 = 1_000_000_000;
@@ -37,15 +32,11 @@ const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
 const GEOMETRIC: [&str; 4] = ["energy", "diffusivity", "drive", "conserve"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
 const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
-/// The rows of a resident member stay in memory until it ends.
-const MAX_SERIES_ROWS: f64 = 1e6;
 const MAX_SNAPSHOTS: usize = 10_000;
-/// The same for snapshots, at four numbers a row.
+/// The rows of a resident member stay in memory until it ends, at four numbers each.
 const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
 /// The lengths approach their mean explicitly, by a factor 1 - ωτ per step.
 pub(crate) const MAX_OMEGA_TAU: f64 = 1.0;
-/// Above this local error a step says nothing about the curve.
-const LOOSEST_ADAPTIVE: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
 const LOOSEST_TOLERANCE: f64 = 0.1;
 const MAX_SWEEPS: u32 = 100_000_000;
@@ -165,92 +156,6 @@ impl Spec {
         }
     }
 
-    fn check_times(&self) -> Result<()> {
-        self.check_final_times()?;
-        match self.pace() {
-            Pace::Fixed(tau) => self.check_fixed(tau)?,
-            Pace::Adaptive(tolerance) => self.check_adaptive(tolerance)?,
-        }
-        let Some(series) = self.series else { return Ok(()) };
-        positive("series", series, "an interval of time", "0.01")?;
-        let Some(t_end) = self.known_end() else { return Ok(()) };
-        let rows = t_end / series;
-        if rows > MAX_SERIES_ROWS {
-            let allowed = format!("at most {MAX_SERIES_ROWS:e} rows: use a longer interval");
-            return Err(Error::value("series", number(series), &format!("about {rows:.1e} rows per member"), &allowed));
-        }
-        Ok(())
-    }
-
-    /// The final time of the spec of a cell, if it is a number.
-    fn known_end(&self) -> Option<f64> {
-        match self.t_end {
-            None | Some(FinalTime::At(_)) => Some(self.final_time()),
-            Some(FinalTime::Auto | FinalTime::OfCells(_)) => None,
-        }
-    }
-
-    fn check_final_times(&self) -> Result<()> {
-        let swept = self.sweep.axes().iter().find(|axis| axis.key == "t-end");
-        let times = match &self.t_end {
-            Some(FinalTime::OfCells(times)) if times.len() as u64 != self.sweep.cells() || swept.is_some() => {
-                return Err(final_times(times.len(), self.sweep.cells()));
-            }
-            Some(FinalTime::OfCells(times)) => times.clone(),
-            _ => self.known_end().into_iter().collect(),
-        };
-        for t in times {
-            positive("t-end", t, "a final time", "2")?;
-            if !TIMES.contains(&t) {
-                let allowed = format!("use a time from {:e} to {:e}", TIMES.start(), TIMES.end());
-                return Err(Error::value("t-end", number(t), "parts or sums of it are not finite", &allowed));
-            }
-        }
-        match swept.is_some_and(|axis| axis.values.iter().any(|value| value.as_str() == Some("auto"))) {
-            true => {
-                let message = "auto is a time for each cell already; give numbers, or --t-end auto without the sweep";
-                Err(Error::Request(format!("--sweep t-end=auto: {message}")))
-            }
-            false => Ok(()),
-        }
-    }
-
-    fn check_fixed(&self, tau: Tau) -> Result<()> {
-        let Tau::Step(tau) = tau else { return Ok(()) };
-        positive("tau", tau, "a time step", "0.001")?;
-        let Some(end) = self.known_end() else { return Ok(()) };
-        let t_end = number(end);
-        if tau > end {
-            let problem = format!("the step is longer than the whole run of {t_end}");
-            let allowed = format!("use a step of at most {t_end} or auto, or a later --t-end");
-            return Err(Error::value("tau", number(tau), &problem, &allowed));
-        }
-        let steps = end / tau;
-        if steps > MAX_STEPS {
-            let problem = format!("about {steps:.1e} steps of {} to --t-end {t_end}", number(tau));
-            let allowed = format!("at most {MAX_STEPS:e} steps: use a larger --tau or an earlier --t-end");
-            return Err(Error::value("tau", number(tau), &problem, &allowed));
-        }
-        Ok(())
-    }
-
-    fn check_adaptive(&self, tolerance: f64) -> Result<()> {
-        if let Some(tau) = self.tau {
-            let problem = format!("steps are either fixed or adaptive, and --adaptive {} is given", number(tolerance));
-            return Err(Error::value("tau", tau, &problem, "leave out one of the two"));
-        }
-        if !(tolerance > 0.0 && tolerance <= LOOSEST_ADAPTIVE) {
-            let allowed = format!("use a number above 0, up to {LOOSEST_ADAPTIVE}, for example {DEFAULT_ADAPTIVE}");
-            return Err(Error::value("adaptive", number(tolerance), "not a local error tolerance", &allowed));
-        }
-        let tightest = tightest_adaptive(self.precision.unwrap_or(Precision::F64));
-        if tolerance < tightest {
-            let problem = "the rounding of the precision is larger";
-            return Err(Error::value("adaptive", number(tolerance), problem, &format!("use {tightest:e} or more")));
-        }
-        Ok(())
-    }
-
     fn check_omega(&self) -> Result<()> {
         let Omega::Rate(omega) = self.omega() else { return Ok(()) };
         if !(omega.is_finite() && omega >= 0.0) {
@@ -322,139 +227,6 @@ impl Spec {
             return Err(Error::value("modes", modes, &problem, &allowed));
         }
         Ok(())
-    }
-
-    /// Refuses what crystals do not have, and waves that the nodes do not resolve.
-    fn check_crystals(&self) -> Result<()> {
-        let (energy, diffusivity) = (&self.energy, &self.diffusivity);
-        let given = energy.as_ref().map(|of| ("energy", of.to_string(), of.typical().waves()));
-        let Some((key, value, _)) =
-            given.or(diffusivity.as_ref().map(|of| ("diffusivity", of.to_string(), of.typical().waves())))
-        else {
-            return Ok(());
-        };
-        let refused = |problem: &str, allowed: &str| Err(Error::value(key, &value, problem, allowed));
-        if self.flow != Flow::SurfaceDiffusion.into() {
-            let problem =
-                format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
-            return refused(&problem, "leave out one of the two");
-        }
-        self.check_geometric("with it a crystal creeps at rest", &format!("--{key} {value}"))?;
-        let waves =
-            [energy.as_ref().map(|of| of.typical().waves()), diffusivity.as_ref().map(|of| of.typical().waves())];
-        let highest = waves.into_iter().flatten().filter_map(|waves| waves.highest_mode()).max().unwrap_or(0);
-        match highest as usize > self.points / 4 {
-            true => {
-                let problem = format!("{} nodes resolve no wave above {}", self.points, self.points / 4);
-                refused(&problem, &format!("use --points {} or more, or a lower M", 4 * highest))
-            }
-            false => Ok(()),
-        }
-    }
-
-    /// Refuses the paper's form, for the reason `in_paper`, where something is `given` for which nodes move in the geometric form.
-    fn check_geometric(&self, in_paper: &str, given: &str) -> Result<()> {
-        match self.form {
-            Some(PositionForm::Paper) => {
-                let problem = format!("{in_paper}, and {given} is given");
-                Err(Error::value("form", "paper", &problem, "use --form geometric, or leave it out"))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Refuses limits for the reason `why`.
-    fn check_limits(&self, has_none: bool, why: &str) -> Result<()> {
-        match self.refine && has_none {
-            true => Err(Error::value("refine", true, why, "use --refine=false, and compare --points by a sweep")),
-            false => Ok(()),
-        }
-    }
-
-    /// Refuses what a driven flow does not have.
-    fn check_forcing(&self) -> Result<()> {
-        self.check_conserved()?;
-        self.check_stretch()?;
-        let Some(drive) = &self.drive else { return Ok(()) };
-        if let Some(conserved) = self.conserve {
-            let problem = format!("a flow is driven or keeps something, and --conserve {conserved} is given");
-            return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
-        }
-        let given = format!("--drive {drive}");
-        let vanish = format!("members are followed until they vanish, with {given}, and t_vanish has no limit yet");
-        self.check_limits(self.is_driven_inwards(), &vanish)?;
-        self.check_geometric("its steps do not see errors of the nodes", &given)
-    }
-
-    /// Refuses what a flow that keeps its area or its length does not have.
-    fn check_conserved(&self) -> Result<()> {
-        let Some(conserved) = self.conserve else {
-            return match &self.conserve_at {
-                Some(at) if !self.sweep.has("conserve") => {
-                    let problem = "nothing is kept there";
-                    Err(Error::value("conserve-at", listed(at), problem, "add --conserve, or leave it out"))
-                }
-                _ => Ok(()),
-            };
-        };
-        let refused = |problem: &str, allowed: &str| Err(Error::value("conserve", conserved, problem, allowed));
-        if self.has_crystals() || *self.flow.typical() == Flow::SurfaceDiffusion {
-            let allowed = "leave it out, or use --flow willmore, elastic or poly";
-            return refused("surface diffusion keeps the area anyway, and could not keep the length", allowed);
-        }
-        let given = format!("--conserve {conserved}");
-        let late =
-            format!("the end is known only when it is reached, with {given}: intervals were found to miss times");
-        self.check_limits(conserved == Conserved::AreaAndLength, &late)?;
-        self.check_geometric("it would not keep anything exactly", &given)?;
-        if conserved == Conserved::AreaAndLength {
-            if let Some(excess) = self.relax_at {
-                let problem = "with area and length the excess stays as it is";
-                return Err(Error::value("relax-at", number(excess), problem, "use --relax-to, a share of the energy"));
-            }
-            if self.stop_when_relaxed == Some(true) {
-                let problem = "with area and length the end is known only when it is reached";
-                return Err(Error::value("stop-when-relaxed", true, problem, "leave it out"));
-            }
-        }
-        self.check_kept(conserved)
-    }
-
-    /// Checks the numbers of `--conserve-at`.
-    fn check_kept(&self, conserved: Conserved) -> Result<()> {
-        let Some(at) = &self.conserve_at else { return Ok(()) };
-        let refused = |problem: &str, allowed: &str| Err(Error::value("conserve-at", listed(at), problem, allowed));
-        let count = if conserved == Conserved::AreaAndLength { 2 } else { 1 };
-        if at.len() != count {
-            let problem = format!("--conserve {conserved} keeps {count} of the two");
-            return refused(&problem, if count == 2 { "give the area and the length" } else { "give one number" });
-        }
-        if !at.iter().all(|number| *number > 0.0 && number.is_finite()) {
-            return refused("not an area or a length", "use finite numbers above 0");
-        }
-        match at[..] {
-            [area, length] if length * length < 4.0 * PI * area => {
-                let least = number((4.0 * PI * area).sqrt());
-                refused("a circle of this area is longer", &format!("use a length above {least}, or a smaller area"))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    fn check_stretch(&self) -> Result<()> {
-        let Some(reduced) = &self.reduced_area else { return Ok(()) };
-        let refused = |problem: &str, allowed: &str| Err(Error::value("reduced-area", reduced, problem, allowed));
-        if self.conserve != Some(Conserved::AreaAndLength) && !self.sweep.has("conserve") {
-            return refused("it changes unless area and length are kept", "add --conserve area,length");
-        }
-        if let Some(at) = &self.conserve_at {
-            let problem = format!("--conserve-at {} gives another one", listed(at));
-            return refused(&problem, "leave out one of the two");
-        }
-        if self.sampling == Sampling::Points {
-            return refused("points that are nodes stay where they are", "use --sampling arclength");
-        }
-        check_reduced_area(*reduced.typical())
     }
 
     fn check_rounding(&self) -> Result<()> {
@@ -612,11 +384,6 @@ pub(crate) fn tightest_adaptive(precision: Precision) -> f64 {
 /// The problem of a redistribution that is too fast for fixed steps.
 pub(crate) fn overshooting(omega: f64, tau: f64) -> String {
     format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
-}
-
-/// Numbers with commas between them.
-fn listed(numbers: &[f64]) -> String {
-    numbers.iter().copied().map(number).collect::<Vec<_>>().join(",")
 }
 
 fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {

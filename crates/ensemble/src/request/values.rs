@@ -1,9 +1,8 @@
 //! The values of a member: those of the spec, with a number drawn for each distribution.
 //!
-//! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the flow
-//! of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are counted
-//! through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive,
-//! reduced area.
+//! They are a pure function of the spec and the member. The numbers of each key have draws of their own, so that the
+//! flow of a member is the same whether or not its shape is drawn, too; only the coordinates of `--design sobol` are
+//! counted through, in the order shape, flow, amplitude, decay, energy, diffusivity, drive, reduced area.
 
 use std::{
     borrow::Cow,
@@ -30,8 +29,8 @@ use curvelax_flow::{
 
 /// Maximum number of members that are shown one by one.
 pub const MAX_NAMED: u64 = 20;
-/// Members whose values, besides the tails of each distribution, stand for all where a bound for all is needed. They are
-/// the first ones of the first cell, whichever run.
+/// Members whose values, besides the tails of each distribution, stand for all where a bound for all is needed. They
+/// are the first ones of the first cell, whichever run.
 const PROBED: u64 = 32;
 /// Shares of the distributions below and above which a bound looks.
 const TAILS: [f64; 2] = [1e-5, 1.0 - 1e-5];
@@ -53,7 +52,7 @@ pub struct MemberValues<'a> {
     pub shape: Cow<'a, Shape>,
     /// The law of motion.
     pub flow: Cow<'a, Flow>,
-    /// What acts beside it, for unit mobility.
+    /// What acts besides it, for unit mobility.
     pub forcing: Forcing,
     /// σ of the perturbation.
     pub amplitude: f64,
@@ -80,7 +79,7 @@ impl Spec {
         }
     }
 
-    /// What acts beside the flow, with this driving force, whose time becomes that of unit mobility.
+    /// What acts besides the flow, with this driving force, whose time becomes that of unit mobility.
     fn forcing(&self, drive: Option<Drive>) -> Forcing {
         let drive = drive.map(|drive| drive.scaled(1.0 / self.mobility()));
         let kept = match (self.conserve, self.conserve_at.as_deref()) {
@@ -160,8 +159,8 @@ impl Spec {
         self.outlines.is_some() && self.curves > 1
     }
 
-    /// Whether its members are shown one by one: there are few, and each is an outline or a cell of its own. They are then
-    /// no sample of anything, and have no statistics.
+    /// Whether its members are shown one by one: there are few, and each is an outline or a cell of its own. They are
+    /// then no sample of anything, and have no statistics.
     pub fn names_members(&self) -> bool {
         let is_one_each = self.members_per_cell() == 1 || self.outlines.is_some() && self.curves == 1;
         is_one_each && (1..=MAX_NAMED).contains(&self.member_count())
@@ -375,7 +374,8 @@ fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Resu
 
 /// What linear theory says about a member of a spec.
 impl Spec {
-    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow, if that is all that acts.
+    /// Returns the time `growth` of [`Flow::growth`] for a member of area `area` under its own flow, if that is all
+    /// that acts.
     pub fn growth(&self, flow: &Flow, forcing: &Forcing, area: f64) -> Option<f64> {
         flow.growth(area).filter(|_| !forcing.acts()).map(|growth| growth / self.mobility())
     }
@@ -386,9 +386,10 @@ impl Spec {
         values.shape.lowest_mode().into_iter().chain(drawn).min()
     }
 
-    /// The rate at which, by linear theory, the excess of a member of this area and length falls once only the slowest mode is
-    /// left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
-    /// [`Flow::excess_rate`]. A driven one has none, since its radius changes; one that keeps area or length keeps the radius.
+    /// The rate at which, by linear theory, the excess of a member of this area and length falls once only the slowest
+    /// mode is left: the lowest one of the shape and the perturbation. It is in 1/time, or an exponent: see
+    /// [`Flow::excess_rate`]. A driven one has none, since its radius changes; one that keeps area or length keeps the
+    /// radius.
     pub fn rate_in_theory(&self, values: &MemberValues, [area, length]: [f64; 2]) -> Option<f64> {
         let (flow, forcing, mode) = (&values.flow, &values.forcing, self.slowest_mode(values)?);
         let radius = match (forcing.conserved, forcing.drive) {

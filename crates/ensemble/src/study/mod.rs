@@ -1,9 +1,9 @@
 //! A study: the cells of a spec, each an ensemble whose members run side by side.
 
-mod judged;
+mod level_sink;
 mod stage;
 
-pub use judged::Judged;
+pub use level_sink::LevelSink;
 pub use stage::{Cohort, Stage};
 
 use std::{borrow::Cow, path::Path, sync::Arc};
@@ -105,8 +105,8 @@ impl Study {
         &self.stages
     }
 
-    /// The cells of a stage. Those of a [selective](Stage::is_selective) one have the members that need it by the times at the
-    /// `levels` before, and there is none without such a member.
+    /// The cells of a stage. Those of a [selective](Stage::is_selective) one have the members that need it by the times
+    /// at the `levels` before, and there is none without such a member.
     ///
     /// # Errors
     /// As [`Study::new`].
@@ -163,7 +163,7 @@ impl Study {
         cells.iter().map(spec).find(Result::is_ok).ok_or_else(none)?
     }
 
-    /// Members of all stages but the finer ones, of which nobody knows before.
+    /// Members of all stages but the finer ones, which are not known in advance.
     pub fn work(&self) -> u64 {
         self.stages.iter().filter(|stage| !stage.is_selective()).map(|stage| stage.members).sum()
     }
@@ -186,7 +186,8 @@ impl Study {
         self.cells[0].spec.points
     }
 
-    /// Members of a stage that leave a portrait: the [`PORTRAITS`] of the study, spread over all cells; none of a level.
+    /// Members of a stage that leave a portrait: the [`PORTRAITS`] of the study, spread over all cells; none of a
+    /// level.
     pub fn portraits(&self, stage: &Stage) -> usize {
         match stage.level {
             Some(_) => 0,
@@ -213,8 +214,8 @@ impl Study {
         (!self.by_size.is_empty()).then(|| format!("{problem}: used {}", self.by_size.join(" ")))
     }
 
-    /// Brings the spec up to date with the cells: it is that of the only cell, such as the number of points of a file, or
-    /// gets by `common` what all cells have in common.
+    /// Brings the spec up to date with the cells: it is that of the only cell, such as the number of points of a file,
+    /// or gets by `common` what all cells have in common.
     pub fn settle_spec(&mut self, common: impl Fn(&mut Spec)) {
         if self.spec.sweep.is_empty() {
             let Spec { only, shard, .. } = self.spec.clone();
@@ -259,8 +260,8 @@ impl Study {
     }
 }
 
-/// Whether two specs have one curve with the same nodes. Curves that are drawn are the same if everything is that a draw
-/// depends on.
+/// Whether two specs have one curve with the same nodes. Curves that are drawn are the same if everything is that a
+/// draw depends on.
 fn same_curve(one: &Spec, other: &Spec) -> bool {
     let drawn = |spec: &Spec| (spec.seed, spec.members_per_cell(), spec.design, spec.common_random_numbers);
     let same_draws = || drawn(one) == drawn(other) && one.distributions() == other.distributions();
@@ -297,7 +298,7 @@ const NARROW: &str = "narrow the distribution, or cut it: LAW in A..B";
 const STRETCHED: usize = 256;
 
 /// How many times more nodes are looked for where so few cannot be refined.
-const MOST_MORE: usize = 8;
+const MAX_MORE: usize = 8;
 
 impl Cell {
     /// The only cell of a spec without a sweep.
@@ -387,7 +388,7 @@ impl Cell {
         };
         let Err(fault) = runs(&self.spec) else { return Ok(()) };
         let n = self.spec.points;
-        let more = (n + 1..=MOST_MORE * n).find(|points| runs(&Spec { points: *points, ..self.spec.clone() }).is_ok());
+        let more = (n + 1..=MAX_MORE * n).find(|points| runs(&Spec { points: *points, ..self.spec.clone() }).is_ok());
         let coarser = format!("n/2 = {} nodes are too few ({fault})", RefinementLevel::HALF.points(n));
         Err(match more {
             Some(points) => Error::value(

@@ -8,17 +8,17 @@
 //! (ln e_m)' = -2 (rate_m(R) + R'/R)
 //! ```
 //!
-//! since the excess goes as the square of the mode's amplitude over the radius. The shares at the start are those of the
-//! tangent's direction over the arclength: on a nearly round curve a mode θ_m of it has the excess ½ m²/(m²-1) θ_m². They
-//! are scaled to the curve's own excess. R(0) is L/2π, which a thin curve takes longer to leave than the radius of the
-//! circle of the same area. Surface diffusion, b = 0, brings a thin curve down to the circle of its area; R is there the
-//! geometric mean of the two. The time of theory is 0.4 to 8 times the real one, for ellipses from 1.1:1 to 20:1,
-//! flowers, the nonconvex curve, the astroid and islands under many flows, to shares of the excess from 0.5 to 10⁻⁶
-//! (table in docs/internals/method.md).
+//! since the excess goes as the square of the mode's amplitude over the radius. The shares at the start are those of
+//! the tangent's direction over the arclength: on a nearly round curve a mode θ_m of it has the excess ½ m²/(m²-1)
+//! θ_m². They are scaled to the curve's own excess. R(0) is L/2π, which a thin curve takes longer to leave than the
+//! radius of the circle of the same area. Surface diffusion, b = 0, brings a thin curve down to the circle of its area;
+//! R is there the geometric mean of the two. The time of theory is 0.4 to 8 times the real one, for ellipses from 1.1:1
+//! to 20:1, flowers, the nonconvex curve, the astroid and islands under many flows, to shares of the excess from 0.5 to
+//! 10⁻⁶ (table in docs/internals/method.md).
 //!
-//! A driving force F adds -F to R', and to first order nothing to the rates. A flow that keeps the area or the length keeps
-//! the radius of the circle of that area or length; the multiplier λ of the length, b(1/R) + λ/R = 0, changes the rates
-//! ([`Forcing::linear_rate`]).
+//! A driving force F adds -F to R', and to first order nothing to the rates. A flow that keeps the area or the length
+//! keeps the radius of the circle of that area or length; the multiplier λ of the length, b(1/R) + λ/R = 0, changes the
+//! rates ([`Forcing::linear_rate`]).
 //!
 //! The excess of a crystal over its Wulff shape has its own size, by the surface energy of the curve, and falls at its
 //! slowest rate. A driven one is none of theory: a force that is the same in all directions has another shape at rest.
@@ -125,8 +125,8 @@ impl CurveScale {
         }
     }
 
-    /// The time after which the excess has fallen to `threshold`, for unit mobility, with `more` excess in the modes from 2 on, by theory;
-    /// `None` if by theory it never does, and for a curve that is not simple.
+    /// The time after which the excess has fallen to `threshold`, for unit mobility, with `more` excess in the modes
+    /// from 2 on, by theory; `None` if by theory it never does, and for a curve that is not simple.
     pub fn relaxes_after(&self, flow: &Flow, forcing: &Forcing, more: &[f64], threshold: f64) -> Option<f64> {
         if forcing.conserved == Some(Conserved::AreaAndLength) || (flow.is_crystal() && forcing.acts()) {
             return None;

@@ -21,10 +21,10 @@ const MARGIN: f64 = 6.0;
 const PERTURBED: f64 = 4.0;
 /// The cap for members that vanish over the life of a circle of the area of the curve.
 const VANISHED_MARGIN: f64 = 2.0;
-/// The same for members that keep area and length, in units of the fourth power of the radius of the circle of that length: the
-/// energy of a 3:1 ellipse is at rest to 10⁻⁷ at a tenth of that.
+/// The same for members that keep area and length, in units of the fourth power of the radius of the circle of that
+/// length: the energy of a 3:1 ellipse is at rest to 10⁻⁷ at a tenth of that.
 const SETTLED: f64 = 0.5;
-/// Bits of a cap, which nobody needs to a digit: few enough that it is the same on every machine.
+/// Bits of a cap, which is not needed to the last digit: few enough that it is the same on every machine.
 const CAP_BITS: u32 = 8;
 /// R⁴ of the curve for which the default numbers are meant, the paper's 2:1 ellipse, and the factor either way within
 /// which they suit a curve.
@@ -63,8 +63,8 @@ fn probes<'a>(spec: &'a Spec, scales: &'a [CurveScale]) -> impl Iterator<Item = 
     pairs.into_iter().map(move |(values, scale)| (drawn[values].clone(), &scales[scale]))
 }
 
-/// What the user should know about times and rates that are far from what the typical curve of a cell needs, and about a
-/// crystal, one sentence each.
+/// What the user should know about times and rates that are far from what the typical curve of a cell needs, and about
+/// a crystal, one sentence each.
 pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
     let scale = &scales[0];
     let rate = rate(spec, scale);
@@ -121,7 +121,7 @@ fn far_omega(spec: &Spec, own: f64) -> Option<String> {
         true => "moves nodes faster than the curve moves",
         false => "is too slow to keep the nodes of the curve evenly spaced",
     };
-    far.then(|| format!("--omega {} {what}: auto is {} here", number(omega), short(own)))
+    far.then(|| format!("--omega {} {what}; use auto, which is {} here", number(omega), short(own)))
 }
 
 fn far_tau(spec: &Spec, own: f64) -> Option<String> {
@@ -131,12 +131,12 @@ fn far_tau(spec: &Spec, own: f64) -> Option<String> {
         ratio if ratio < SHORT_TAU => "needs far more steps than the curve does",
         _ => return None,
     };
-    Some(format!("--tau {} {what}: auto is {} here", number(tau), short(own)))
+    Some(format!("--tau {} {what}; use auto, which is {} here", number(tau), short(own)))
 }
 
 fn far_end(spec: &Spec, scale: &CurveScale) -> Option<String> {
     let values = spec.typical();
-    // A driven curve goes on when it has relaxed, and of one that keeps both theory knows nothing.
+    // A driven curve continues when it has relaxed, and of one that keeps both theory knows nothing.
     if values.forcing.drive.is_some() || spec.keeps_both() {
         return None;
     }
@@ -260,8 +260,8 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
     Err(Error::value("omega", spec.omega(), &overshooting(omega, tau), &allowed))
 }
 
-/// Checks the number of steps to a final time that does not suit the curve, or to the member's own end if that is before.
-/// An own end is asked for only where it matters: it is an integration.
+/// Checks the number of steps to a final time that does not suit the curve, or to the member's own end if that is
+/// before. An own end is asked for only where it matters: it is an integration.
 fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, own_omega: f64, own_tau: f64) -> Result<()> {
     let steps_to = |t_end: f64| match (spec.pace(), spec.omega()) {
         (Pace::Fixed(Tau::Auto), _) => t_end / own_tau,
@@ -325,16 +325,16 @@ mod tests {
     }
 
     #[test]
-    fn a_time_or_a_rate_that_is_far_from_the_curve_s_own_is_warned_about_with_the_value_that_fits() {
+    fn a_time_or_a_rate_that_does_not_suit_the_curve_is_warned_of_with_one_that_does() {
         let warned = |text: &str| study(text).unwrap().warnings();
         for (text, start) in [
             ("omega = 1\nadaptive = 0.001\nshape = 'ellipse:200,100'\nt-end = 2e8", "--omega 1 needs more steps than"),
             (
                 "omega = 1e-4\nadaptive = 0.001",
-                "--omega 0.0001 is too slow to keep the nodes of the curve evenly spaced: auto is 1 here",
+                "--omega 0.0001 is too slow to keep the nodes of the curve evenly spaced; use auto, which is 1 here",
             ),
-            ("omega = 500", "--omega 500 moves nodes faster than the curve moves: auto is 1 here"),
-            ("tau = 0.11", "--tau 0.11 is too long for the curve to be followed: auto is 0.000998 here"),
+            ("omega = 500", "--omega 500 moves nodes faster than the curve moves; use auto, which is 1 here"),
+            ("tau = 0.11", "--tau 0.11 is too long for the curve to be followed; use auto, which is 0.000998 here"),
             ("tau = 9e-9\nt-end = 0.01", "--tau 9e-9 needs far more steps than the curve does"),
             (
                 "t-end = 1e-4\ntau = 1e-6",

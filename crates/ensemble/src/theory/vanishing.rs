@@ -6,8 +6,8 @@
 //! t = ∫₀ᴿ dR / (b(1/R) + F(πR²))
 //! ```
 //!
-//! Under surface diffusion and a constant force that is R/F. The area of any simple curve falls at the rate F L or faster
-//! than that of the circle of the same area, which so lives longest.
+//! Under surface diffusion and a constant force that is R/F. The area of any simple curve falls at the rate F L or
+//! faster than that of the circle of the same area, which so lives longest.
 
 use std::f64::consts::PI;
 
@@ -23,8 +23,8 @@ const GAUSS: [(f64, f64); 4] = [
     (0.861_136_311_594_052_6, 0.347_854_845_137_453_85),
 ];
 
-/// The time after which a circle of this radius has shrunk to a point, for unit mobility; `None` without a driving force, or if it
-/// comes to rest before, or grows.
+/// The time after which a circle of this radius has shrunk to a point, for unit mobility; `None` without a driving
+/// force, or if it comes to rest before, or grows.
 pub fn vanishes_after(flow: &Flow, forcing: &Forcing, radius: f64) -> Option<f64> {
     let drive = forcing.drive?;
     let half = 0.5 * radius / f64::from(PANELS);

@@ -45,7 +45,8 @@ impl Trajectory<'_> {
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
-    /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is [needed](Trajectory::needs_last_state).
+    /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is
+    /// [needed](Trajectory::needs_last_state).
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
         let frames = std::mem::take(&mut self.frames);
         let progress = &self.report.progress;
@@ -67,10 +68,10 @@ impl Trajectory<'_> {
         };
         let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
         // What happens to a curve at rest takes nothing from its time; one that is driven to a point is never at rest.
-        let on_its_way = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
+        let is_vanishing = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
         let status = match failed {
             Some(Status::Vanished) => Status::Vanished,
-            Some(failed) if on_its_way && failed != Status::Relaxed => failed,
+            Some(failed) if is_vanishing && failed != Status::Relaxed => failed,
             _ if t_relax.is_some() => Status::Relaxed,
             failed => failed.unwrap_or(Status::Unfinished),
         };

@@ -5,9 +5,9 @@
 //! reports, with adaptive ones on the curves inside, whose first one past the level is found between two of them.
 //!
 //! It also pauses after an adaptive step in which an observable may have turned round beyond the level, though neither
-//! end of the step is there: where it leaves the start towards the level and comes to the end from there, steeply enough
-//! for both lines to meet beyond it ([`passes_level`](curvelax_flow::scheme::observe::passes_level)). The host then looks for the
-//! extremum on the curves inside.
+//! end of the step is there: where it leaves the start towards the level and comes to the end from there, steeply
+//! enough for both lines to meet beyond it ([`passes_level`](curvelax_flow::scheme::observe::passes_level)). The host
+//! then looks for the extremum on the curves inside.
 
 use super::{Time, Trajectory, watch::Watch};
 use curvelax_flow::scheme::{State, dense::LOOKS, member::Observed, observe::falls_inside};
@@ -32,8 +32,8 @@ impl Trajectory<'_> {
         matches!(self.time, Time::Adaptive(_)) && self.watches.iter().any(wanted)
     }
 
-    /// Whether an observable may have reached a level inside the step after which the member paused, and left it again. In
-    /// later dispatches the curves of that step may be gone.
+    /// Whether an observable may have reached a level inside the step after which the member paused, and left it again.
+    /// In later dispatches the curves of that step may be gone.
     fn may_have_passed(&self) -> bool {
         self.counters.passed != 0 && self.needs_aim()
     }
@@ -88,8 +88,8 @@ impl Trajectory<'_> {
     }
 }
 
-/// The first place in a step at which a distance is 0 or less, if it is found, by the distances at both `ends` and inside:
-/// from part to part, at the end of one or where the distance turns round.
+/// The first place in a step at which a distance is 0 or less, if it is found, by the distances at both `ends` and
+/// inside: from part to part, at the end of one or where the distance turns round.
 fn first_past(ends: [f64; 2], distance: impl Fn(f64) -> f64) -> Option<f64> {
     let place = |part: u32| match part {
         0 => (0.0, ends[0]),
@@ -116,8 +116,8 @@ fn first_past(ends: [f64; 2], distance: impl Fn(f64) -> f64) -> Option<f64> {
     None
 }
 
-/// A place between `ends` with a low distance, by the golden section: the first that is found at 0 or below, or else the
-/// lowest one.
+/// A place between `ends` with a low distance, by the golden section: the first that is found at 0 or below, or else
+/// the lowest one.
 fn lowest(known: (f64, f64), [mut low, mut high]: [f64; 2], distance: impl Fn(f64) -> f64) -> (f64, f64) {
     let mut best = known;
     let place = |at: f64| (at, distance(at));

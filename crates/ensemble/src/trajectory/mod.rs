@@ -42,8 +42,8 @@ const FASTEST: f64 = 0.1;
 /// what comes of a step that is far too long depends on roundings.
 const FIRST_STEP: f64 = 3.0;
 /// Maximum number of adaptive steps to an error of 1; it scales with the inverse fourth root of the error, and a member
-/// that exceeds it is stalled. Curves that relax take some 1 to 50, and nonconvex ones that the force of the polygon moves
-/// up to 300; one that creeps, because only tiny steps can be solved, would not end in reasonable time.
+/// that exceeds it is stalled. Curves that relax take some 1 to 50, and nonconvex ones that the force of the polygon
+/// moves up to 300; one that creeps, because only tiny steps can be solved, would not end in reasonable time.
 const MAX_STEPS: f64 = 1000.0;
 /// Further steps per time 1/ω: a curve at rest takes one or two, since lengths approach their mean explicitly.
 const MAX_STEPS_AT_REST: f64 = 4.0;
@@ -82,12 +82,12 @@ impl Time {
 
 /// Where the lengths of a back end are in the user's frame.
 #[derive(Clone, Copy, Debug)]
-pub struct Placing {
+pub struct UserFrame {
     unit: f64,
     origin: DVec2,
 }
 
-impl Placing {
+impl UserFrame {
     /// Returns the nodes of a state.
     pub fn nodes(self, state: &State<f64>) -> Vec<DVec2> {
         state.curve.positions().map(|node| node * self.unit + self.origin).collect()
@@ -196,7 +196,7 @@ impl Trajectory<'_> {
         if let Some(own) = &mut self.vanishing {
             own.until = until;
         }
-        // One that is so small goes on because it does not vanish in time.
+        // One that is so small continues because it does not vanish in time.
         self.vanishing.take_if(|own| own.is_due(&self.report.now));
         Ok(())
     }
@@ -289,8 +289,8 @@ impl Trajectory<'_> {
     }
 
     /// Returns how its states are placed in the user's frame.
-    pub fn placing(&self) -> Placing {
-        Placing { unit: self.unit, origin: self.member.origin }
+    pub fn placing(&self) -> UserFrame {
+        UserFrame { unit: self.unit, origin: self.member.origin }
     }
 
     /// Returns the fraction of its time that has passed.

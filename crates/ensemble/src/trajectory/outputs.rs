@@ -20,8 +20,8 @@ const LOOKS_PER_SPACING: f64 = 16.0;
 const LOOKS_PER_CROSSING: u32 = 10;
 
 impl Trajectory<'_> {
-    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step, also
-    /// an event, or to check for crossings.
+    /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step,
+    /// also an event, or to check for crossings.
     pub fn wants_state(&self) -> bool {
         let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
         self.is_look_due() || self.events_need_state() || due.any(|output| self.needs_curve(&output))
@@ -33,8 +33,8 @@ impl Trajectory<'_> {
     }
 
     /// Serves the output times and finds the events that the last step has reached, and checks for crossings if due;
-    /// `state` is needed if [`Trajectory::wants_state`]. Returns whether all are served: it stops while `most` bytes of rows or
-    /// more are in memory.
+    /// `state` is needed if [`Trajectory::wants_state`]. Returns whether all are served: it stops while `most` bytes of
+    /// rows or more are in memory.
     pub fn serve(&mut self, state: Option<&State<f64>>, most: usize) -> bool {
         if let (true, Some(state)) = (self.is_look_due(), state) {
             self.look(state);
@@ -157,8 +157,8 @@ impl Trajectory<'_> {
     /// Checks whether the polygon crosses itself, and sets how far its nodes may move before the next check.
     ///
     /// A curve whose tangent turns once and always to one side is simple, so the back end pauses only members whose
-    /// curvature changes sign. An adaptive step is long: it is gone through from where a crossing is possible, as far at
-    /// a time as none is.
+    /// curvature changes sign. An adaptive step is long: it is gone through from where a crossing is possible, as far
+    /// at a time as none is.
     pub(super) fn look(&mut self, state: &State<f64>) {
         let Progress { turning, travel, taken, .. } = self.report.progress;
         let moved = farthest(&state.before, &state.curve);

@@ -1,8 +1,9 @@
 //! When a member that keeps area and length is relaxed.
 //!
-//! Its excess stays as it is, and the curve at its end is no circle. What falls is the energy; how far is known only at the end.
-//! The energy is therefore recorded at times that are dense from early to late ones, and when the final time has come, t_relax is
-//! the first at which only a share of its way is left. It has none if the energy still falls by then.
+//! Its excess stays as it is, and the curve at its end is no circle. What falls is the energy; how far is known only at
+//! the end. The energy is therefore recorded at times that are dense from early to late ones, and when the final time
+//! has come, t_relax is the first at which only a share of its way is left. It has none if the energy still falls by
+//! then.
 
 use crate::{Observables, Spec};
 
@@ -36,7 +37,8 @@ impl Settling {
         spec.keeps_both().then(|| Settling { share: spec.threshold(1.0), energies: vec![[0.0, start.energy]] })
     }
 
-    /// When it was relaxed and when half of the way was left, for this energy at the final time; nothing if that still falls.
+    /// When it was relaxed and when half of the way was left, for this energy at the final time; nothing if that still
+    /// falls.
     pub(super) fn times(&self, t_end: f64, end: f64) -> [Option<f64>; 2] {
         let [_, start] = self.energies[0];
         let way = start - end;

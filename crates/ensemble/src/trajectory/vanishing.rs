@@ -1,11 +1,11 @@
 //! Members that a driving force shrinks to a point.
 //!
-//! The steps that follow a curve to a point are ever shorter. It is therefore followed to a share of its length, at which
-//! it pauses as for an event. By then it is round, since its relaxation time falls as the fourth power of its
+//! The steps that follow a curve to a point are ever shorter. It is therefore followed to a share of its length, at
+//! which it pauses as for an event. By then it is round, since its relaxation time falls as the fourth power of its
 //! radius and its life as the first, and what is left is the [life of a circle](vanishes_after).
 //!
-//! An adaptive step must not pass the end of that life: nodes would cross the centre, and the curve would grow again, upside
-//! down. Steps therefore end where half of what is left has passed, and again at half of the rest.
+//! An adaptive step must not pass the end of that life: nodes would cross the centre, and the curve would grow again,
+//! upside down. Steps therefore end where half of what is left has passed, and again at half of the rest.
 
 use std::f64::consts::PI;
 
@@ -17,8 +17,8 @@ use curvelax_flow::{
     scheme::{Parameters, member::Observed},
 };
 
-/// Share of the length of a curve at which it ends; that of a crystal, whose edges grow apart on the way. Events and snapshots
-/// until then are found.
+/// Share of the length of a curve at which it ends; that of a crystal, whose edges grow apart on the way. Events and
+/// snapshots until then are found.
 const LEFT: f64 = 0.1;
 const CRYSTAL_LEFT: f64 = 0.25;
 /// The part of the life of a curve after which steps end.
@@ -78,8 +78,8 @@ impl Vanishing {
         now.length <= self.level
     }
 
-    /// The time that is left to a curve, for unit mobility. Its area falls at the rate F times its length, so 2A/L is the radius
-    /// that lasts as long; on a circle its nodes are a little outside.
+    /// The time that is left to a curve, for unit mobility. Its area falls at the rate F times its length, so 2A/L is
+    /// the radius that lasts as long; on a circle its nodes are a little outside.
     pub(super) fn left(&self, at: &Observables) -> Option<f64> {
         vanishes_after(&self.flow, &self.forcing, self.outer * (2.0 * at.area.abs() / at.length))
     }
@@ -100,7 +100,8 @@ mod tests {
         let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
         own.aim(&mut parameters);
         assert_eq!((parameters.watched, parameters.low_length), (1.0, f64::from(0.4_f32)));
-        // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of 2.
+        // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of
+        // 2.
         assert!((own.until - 2_f64.sqrt() / 16.0).abs() < 1e-12);
         // An event at a longer length comes first.
         parameters.low_length = 3.0;

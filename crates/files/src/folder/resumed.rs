@@ -146,7 +146,7 @@ mod tests {
     };
 
     #[test]
-    fn a_file_goes_on_after_its_mark_wherever_the_run_was_interrupted() {
+    fn a_file_continues_after_its_mark_wherever_the_run_was_interrupted() {
         for published in [false, true] {
             let home = tempfile::tempdir().unwrap();
             let folder = OutputFolder::open(home.path(), true).unwrap();

@@ -1,7 +1,7 @@
 //! The checkpoint from which `resume` continues: the file `.curvelax.state` and its predecessor `.curvelax.state.old`.
 //!
-//! Each is an [envelope](super::envelope) around [`Head`] and [`Standing`]. It holds the lengths and checksums of the
-//! tables, not the tables: a resumed run cuts off rows written later.
+//! Each is an [envelope](super::envelope) around [`CheckpointHead`] and [`RunProgress`]. It holds the lengths and
+//! checksums of the tables, not the tables: a resumed run cuts off rows written later.
 
 use std::{
     collections::BTreeMap,
@@ -26,11 +26,11 @@ use crate::{
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_curve::outlines;
-use curvelax_ensemble::{Ended, Outlines, Paused, Standing, Study};
-use curvelax_study::{placement::Platform, results::tally::Aside};
+use curvelax_ensemble::{Ended, Outlines, Paused, RunProgress, Study};
+use curvelax_study::{placement::Platform, results::tally::TallySupplement};
 
 /// The content of the file.
-type Body = (Head, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
+type Body = (CheckpointHead, u64, BTreeMap<u64, Ended>, BTreeMap<u64, Paused>);
 
 /// The fingerprint of the layout of all data that `resume` reads.
 pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<(Body, SpilledRows)>);
@@ -54,7 +54,7 @@ pub struct Origin {
 
 /// The part of a checkpoint that is not about members in progress.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Head {
+pub struct CheckpointHead {
     /// The origin of the run.
     pub origin: Origin,
     /// Wall time of the run so far.
@@ -68,7 +68,7 @@ pub struct Head {
     /// Rows of members that are still running, if these were too many for memory.
     pub rows: Option<Mark>,
     /// Data on the members that ended that are not in their rows.
-    pub aside: Aside,
+    pub supplement: TallySupplement,
     /// The first members.
     pub films: Vec<Film>,
 }
@@ -76,9 +76,9 @@ pub struct Head {
 /// A checkpoint that was read back and is valid.
 pub struct Saved {
     /// Progress of the run.
-    pub head: Head,
+    pub head: CheckpointHead,
     /// Progress of its members.
-    pub standing: Standing,
+    pub progress: RunProgress,
     /// Why it is not the last checkpoint, if so.
     pub note: Option<String>,
 }
@@ -139,9 +139,9 @@ fn here() -> Result<String> {
     name.ok_or_else(|| refuse(format!("has a name that is not UTF-8: {}; use another one", here.display())))
 }
 
-/// The bytes of a checkpoint; `resident` is used instead of that in `standing`.
-pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
-    let body = (head, standing.next, &standing.early, resident);
+/// The bytes of a checkpoint; `resident` is used instead of that in `progress`.
+pub fn to_bytes(head: &CheckpointHead, progress: &RunProgress, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
+    let body = (head, progress.next, &progress.early, resident);
     sealed_body(*LAYOUT, &body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
 }
 
@@ -149,23 +149,23 @@ pub fn to_bytes(head: &Head, standing: &Standing, resident: &BTreeMap<u64, Pause
 ///
 /// # Errors
 /// Those of [`opened`].
-pub fn from_bytes(bytes: &[u8]) -> Result<(Head, Standing), Fault> {
+pub fn from_bytes(bytes: &[u8]) -> Result<(CheckpointHead, RunProgress), Fault> {
     let (head, next, early, resident): Body = body(opened(*LAYOUT, bytes)?)?;
-    Ok((head, Standing { next, early, resident: Some(resident) }))
+    Ok((head, RunProgress { next, early, resident: Some(resident) }))
 }
 
 /// Reads the checkpoint at `path`.
-pub fn read(path: &Path) -> Result<(Head, Standing), Fault> {
+pub fn read(path: &Path) -> Result<(CheckpointHead, RunProgress), Fault> {
     from_bytes(&bytes(path)?)
 }
 
-/// Members in progress by the last checkpoint in `folder` that have not ended in `standing`. If the current ones are
+/// Members in progress by the last checkpoint in `folder` that have not ended in `progress`. If the current ones are
 /// lost, these resume from there.
-pub fn on_their_way(folder: &OutputFolder, stage: u64, standing: &Standing) -> BTreeMap<u64, Paused> {
+pub fn in_progress(folder: &OutputFolder, stage: u64, progress: &RunProgress) -> BTreeMap<u64, Paused> {
     let read = |name| read(folder.place(name).at());
     match read(STATE).or_else(|_| read(STATE_OLD)) {
-        Ok((head, Standing { resident: Some(mut resident), .. })) if head.stage == stage => {
-            resident.retain(|rank, _| *rank >= standing.next && !standing.early.contains_key(rank));
+        Ok((head, RunProgress { resident: Some(mut resident), .. })) if head.stage == stage => {
+            resident.retain(|rank, _| *rank >= progress.next && !progress.early.contains_key(rank));
             resident
         }
         _ => BTreeMap::new(),
@@ -187,18 +187,18 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
             Ok(false) => continue,
             Err(e) => return refuse(format!("cannot find {name} in it ({e})")),
         }
-        let found = read(folder.place(name).at()).and_then(|(head, standing)| {
+        let found = read(folder.place(name).at()).and_then(|(head, progress)| {
             let tables = head.tables.iter().chain(&head.rows).try_for_each(|mark| folder.check(mark));
             let store = head.store.as_ref().map_or(Ok(()), |mark| folder.check_store(mark));
             let film = head.films.iter().find_map(|film| Some((film.member, film.fault()?)));
             let films =
                 film.map_or(Ok(()), |(member, fault)| Err(format!("the portrait of member {member} has not {fault}")));
-            tables.and(store).and(films).map_err(Fault::Damaged).map(|()| (head, standing))
+            tables.and(store).and(films).map_err(Fault::Damaged).map(|()| (head, progress))
         });
         match found {
-            Ok((head, standing)) => {
+            Ok((head, progress)) => {
                 let note = faults.pop().map(|fault| format!("{fault}; continuing from the checkpoint before it"));
-                return Ok(Some(Saved { head, standing, note }));
+                return Ok(Some(Saved { head, progress, note }));
             }
             Err(Fault::Foreign(what)) => {
                 return refuse(format!("{name}: {what}; resume with the version that started it, or start over"));
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    fn state() -> (Head, Standing) {
+    fn state() -> (CheckpointHead, RunProgress) {
         let origin = Origin {
             spec: "curves = 3\n".into(),
             platform: platform(),
@@ -257,14 +257,14 @@ mod tests {
             outlines: vec![("island.csv".into(), 7)],
             started: Duration::from_secs(1_800_000_000),
         };
-        let head = Head {
+        let head = CheckpointHead {
             origin,
             wall: Duration::from_millis(1500),
             stage: 0,
             tables: vec![Mark { name: "summary.csv".into(), length: 300, crc: 5 }],
             store: None,
             rows: Some(Mark { name: "curvelax.rows".into(), length: 1 << 41, crc: 6 }),
-            aside: Aside::default(),
+            supplement: TallySupplement::default(),
             films: Vec::new(),
         };
         let early = Ended {
@@ -280,20 +280,20 @@ mod tests {
             unresolved: true,
         };
         let resident = Some(BTreeMap::from([(1, paused(1.5)), (3, paused(2.5))]));
-        (head, Standing { next: 1, early: BTreeMap::from([(2, early)]), resident })
+        (head, RunProgress { next: 1, early: BTreeMap::from([(2, early)]), resident })
     }
 
     fn bytes() -> Vec<u8> {
-        let (head, standing) = state();
-        to_bytes(&head, &standing, standing.resident.as_ref().unwrap()).unwrap()
+        let (head, progress) = state();
+        to_bytes(&head, &progress, progress.resident.as_ref().unwrap()).unwrap()
     }
 
     #[test]
     fn a_state_reads_back_to_the_last_bit() {
-        let (head, standing) = from_bytes(&bytes()).unwrap();
+        let (head, progress) = from_bytes(&bytes()).unwrap();
         assert_eq!(head, state().0);
-        assert_eq!((standing.next, &standing.early), (1, &state().1.early));
-        let resident = standing.resident.unwrap();
+        assert_eq!((progress.next, &progress.early), (1, &state().1.early));
+        let resident = progress.resident.unwrap();
         assert_eq!(resident.keys().collect::<Vec<_>>(), [&1, &3]);
         let bits = |state: &[f64]| state.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&resident[&3].state), bits(&paused(2.5).state));
@@ -319,8 +319,8 @@ mod tests {
         let layout = layout::<(Body, SpilledRows)>().unwrap();
         let named: BTreeSet<&str> = layout.split(' ').filter(|word| word.starts_with(char::is_uppercase)).collect();
         let expected = [
-            ["Head", "Origin", "Platform", "DeviceKind", "Precision", "Duration", "Mark", "Film"],
-            ["Aside", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
+            ["CheckpointHead", "Origin", "Platform", "DeviceKind", "Precision", "Duration", "Mark", "Film"],
+            ["TallySupplement", "MollifiedMembers", "Moments", "ExactSum", "Ended", "Outcome", "Status", "Observables"],
             ["Rows", "Extent", "SeriesRow", "Snapshot", "Portrait", "Mollified", "DVec2", "Paused"],
             ["Counters", "Report", "Observed", "Progress", "Decay", "StoreMark", "ArrayMark", "Features"],
             ["Spread", "Treated", "", "", "", "", "", ""],
@@ -343,8 +343,8 @@ mod tests {
     fn a_state_of_a_build_with_other_types_is_refused_with_the_remedy() {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let (head, standing) = state();
-        let body = (&head, standing.next, &standing.early, standing.resident.as_ref().unwrap());
+        let (head, progress) = state();
+        let body = (&head, progress.next, &progress.early, progress.resident.as_ref().unwrap());
         folder.keep_state(&sealed_body(*LAYOUT ^ 1, &body).unwrap()).unwrap();
         let Err(error) = find(&folder) else { panic!("it is read") };
         let (path, own, other) = (home.path().display(), *LAYOUT, *LAYOUT ^ 1);
@@ -363,25 +363,25 @@ mod tests {
         for seed in std::fs::read_dir(&seeds).unwrap() {
             let body = std::fs::read(seed.unwrap().path()).unwrap();
             let write = |bytes: Vec<u8>| Ok::<_, ()>([&bytes[..], body.strip_prefix(b"s").unwrap()].concat());
-            let (_, standing) = from_bytes(&sealed(*LAYOUT, write).unwrap()).unwrap();
-            members += standing.resident.unwrap().len();
+            let (_, progress) = from_bytes(&sealed(*LAYOUT, write).unwrap()).unwrap();
+            members += progress.resident.unwrap().len();
         }
         assert!(members >= 3, "{members}");
     }
 
     #[test]
-    fn members_that_ended_since_are_no_longer_on_their_way() {
+    fn members_that_ended_since_are_no_longer_in_progress() {
         let home = tempfile::tempdir().unwrap();
         let folder = OutputFolder::open(home.path(), true).unwrap();
         folder.keep_state(&bytes()).unwrap();
-        let ranks = |stage: u64, standing: &Standing| -> Vec<u64> {
-            on_their_way(&folder, stage, standing).into_keys().collect()
+        let ranks = |stage: u64, progress: &RunProgress| -> Vec<u64> {
+            in_progress(&folder, stage, progress).into_keys().collect()
         };
-        let none = Standing::default();
+        let none = RunProgress::default();
         assert_eq!(ranks(0, &none), [1, 3]);
-        assert_eq!(ranks(0, &Standing { next: 2, ..none.clone() }), [3]);
+        assert_eq!(ranks(0, &RunProgress { next: 2, ..none.clone() }), [3]);
         assert_eq!(
-            ranks(0, &Standing { early: BTreeMap::from([(3, state().1.early[&2].clone())]), ..none.clone() }),
+            ranks(0, &RunProgress { early: BTreeMap::from([(3, state().1.early[&2].clone())]), ..none.clone() }),
             [1]
         );
         assert_eq!(ranks(1, &none), [0; 0], "of another stage");

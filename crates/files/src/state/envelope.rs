@@ -115,7 +115,7 @@ fn unreadable(e: postcard::Error) -> Fault {
 }
 
 /// The length of the body, as given in the bytes before it.
-fn told(before: &[u8]) -> Option<u64> {
+fn stated_length(before: &[u8]) -> Option<u64> {
     before.get(BEFORE - 8..BEFORE)?.try_into().ok().map(u64::from_le_bytes)
 }
 
@@ -132,8 +132,8 @@ pub fn bytes(path: &Path) -> Result<Vec<u8>, Fault> {
         let mut bytes = Vec::new();
         // A foreign file is not read to its end if the length does not match.
         (&file).take(BEFORE as u64).read_to_end(&mut bytes)?;
-        let told = told(&bytes).and_then(|told| told.checked_add((BEFORE + AFTER) as u64));
-        if told == Some(length) {
+        let stated = stated_length(&bytes).and_then(|length| length.checked_add((BEFORE + AFTER) as u64));
+        if stated == Some(length) {
             // Nor into memory, if the checksum is wrong.
             check_whole(&mut file, length)?;
             file.rewind()?;
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn what_another_program_wrote_is_told_from_damage() {
+    fn what_another_program_wrote_is_distinguished_from_damage() {
         assert_eq!(read(&sample()), Ok((7, "text")));
         let with = |at: usize, byte: u8| {
             let mut bytes = sample();

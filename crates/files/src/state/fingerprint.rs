@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_layout_is_told_in_words() {
+    fn a_layout_is_written_in_words() {
         assert_eq!(layout::<base::Inner>().unwrap(), "Inner { first: u32 second: f64 end ");
         assert_eq!(layout::<(bool, Option<String>)>().unwrap(), "( bool option string end ");
         assert_eq!(layout::<Vec<[u8; 2]>>().unwrap(), "list ( u8 u8 end end ");

@@ -12,7 +12,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    checkpoint::{self, Head},
+    checkpoint::{self, CheckpointHead},
     envelope::{self, Fault, opened, sealed_body},
     fingerprint::fingerprint,
 };
@@ -42,7 +42,7 @@ pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Record>);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
     /// As in the last checkpoint of the run: all members have ended.
-    pub head: Head,
+    pub head: CheckpointHead,
     /// Nodes per member, if all have the same number.
     pub points: usize,
     /// Warnings that do not follow from the results, one sentence each.
@@ -77,7 +77,7 @@ pub enum Found {
 }
 
 /// The bytes of the file.
-pub fn to_bytes(head: &Head, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
+pub fn to_bytes(head: &CheckpointHead, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
     let bytes = sealed_body(*LAYOUT, &(head, points, warnings));
     bytes.map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
 }
@@ -151,9 +151,9 @@ fn part(path: &Path) -> Result<FinishedShard> {
     Ok(FinishedShard { path: path.to_path_buf(), shard, spec, record })
 }
 
-/// Checks that the files which a merge makes anew are those of the shard of `spec`, as far as they are there: their folder
-/// may be a mixture.
-fn check_beside(path: &Path, spec: &Spec, Head { origin, films, .. }: &Head) -> Result<()> {
+/// Checks that the files which a merge makes anew are those of the shard of `spec`, as far as they are there: their
+/// folder may be a mixture.
+fn check_beside(path: &Path, spec: &Spec, CheckpointHead { origin, films, .. }: &CheckpointHead) -> Result<()> {
     if there(path, RUN)? {
         let own = reader::provenance(path)?;
         if let Some((key, here, there)) = own.spec.difference(spec, &MOVED_KEYS) {

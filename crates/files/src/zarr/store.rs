@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_store_goes_on_from_every_member_to_the_same_bytes() {
+    fn a_store_continues_from_every_member_to_the_same_bytes() {
         let (spec, members) = (spec(7, &[0.0, 1.0, 2.0]), members());
         let begin =
             |folder: PartFolder| SnapshotStore::of_chunks(folder, &spec, 5, spec.snapshots.clone(), 360).unwrap();

@@ -1,11 +1,11 @@
 //! How many members need more nodes than they have, by those that the pilots of the first three levels ran.
 
-use super::pilot::Seen;
+use super::pilot::PilotResult;
 use curvelax_ensemble::{LevelRow, LevelTimes, RefinementLevel, Spec, Study};
 use curvelax_flow::number::Precision;
 
-/// Work at all its finer levels of a member that needs some, in that of a member of n nodes. Measured: 3 for flowers with
-/// an amplitude of 0.1, 10 for ellipses of 4:1, 11 for flowers with 0.3; all levels up to 16 n would be 51.
+/// Work at all its finer levels of a member that needs some, in that of a member of n nodes. Measured: 3 for flowers
+/// with an amplitude of 0.1, 10 for ellipses of 4:1, 11 for flowers with 0.3; all levels up to 16 n would be 51.
 const LADDER: f64 = 8.0;
 /// Rows of such a member at finer levels.
 pub const ROWS: f64 = 4.0;
@@ -22,7 +22,7 @@ pub struct FinerPilot {
 
 impl FinerPilot {
     /// Adds what the first pilot of a stage at `level` shows, which has the same members at all levels.
-    pub fn add(&mut self, level: RefinementLevel, cell: &Spec, precision: Precision, seen: &Seen) {
+    pub fn add(&mut self, level: RefinementLevel, cell: &Spec, precision: Precision, seen: &PilotResult) {
         for ended in &seen.ended {
             let row = LevelRow::new(level, cell, precision, ended);
             if self.levels.add(&row).is_ok() && level == RefinementLevel::FULL {

@@ -2,8 +2,8 @@
 //!
 //! Work cannot be predicted from a spec: the steps and sweeps of a member depend on its curve. Pilots therefore
 //! run a few members, spread evenly over all cells, on the back end of the run and through the same loop, as far as a
-//! fixed amount of work goes: some two seconds of it on two cores. Sizes follow from what they find and from the spec; no
-//! clock has a part in them.
+//! fixed amount of work goes: some two seconds of it on two cores. Sizes follow from what they find and from the spec;
+//! no clock has a part in them.
 
 mod finer;
 mod pilot;
@@ -17,13 +17,13 @@ use curvelax_backend::DeviceKind;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
 use curvelax_files::zarr;
-use curvelax_study::placement::{Choice, Platform};
+use curvelax_study::placement::{ChosenBackend, Platform};
 use finer::FinerPilot;
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
 use size::Residents;
 
-/// Work of the pilots of all cohorts, in updates of nodes: for each thread of the CPU, and on a GPU, which may be one in
-/// software.
+/// Work of the pilots of all cohorts, in updates of nodes: for each thread of the CPU, and on a GPU, which may be one
+/// in software.
 const WORK_PER_THREAD: f64 = 1.5e8;
 const WORK_ON_GPU: f64 = 2e9;
 const WORK_IN_SOFTWARE: f64 = 2e7;
@@ -31,7 +31,7 @@ const WORK_IN_SOFTWARE: f64 = 2e7;
 const LEVELS: f64 = 0.25;
 /// Maximum cohorts with a pilot: each gets its share of the work, and less would show nothing.
 const MAX_PILOTS: usize = 20;
-/// Time after which pilots are given up, so that nobody waits for a step that takes minutes.
+/// Time after which pilots are given up, so that no user waits for a step that takes minutes.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The predicted cost of a run.
@@ -87,14 +87,14 @@ pub struct Pilot {
 }
 
 impl Estimate {
-    /// Estimates the run of a study, each stage on its choice, that saves a checkpoint after each `interval`. An error of
-    /// `stopped` ends it.
+    /// Estimates the run of a study, each stage on its choice, that saves a checkpoint after each `interval`. An error
+    /// of `stopped` ends it.
     ///
     /// # Errors
     /// Those of the run itself, and that of `stopped`.
     pub fn new(
         study: &Study,
-        choices: Vec<Choice>,
+        choices: Vec<ChosenBackend>,
         interval: Duration,
         stopped: &dyn Fn() -> Option<Error>,
     ) -> Result<Estimate> {
@@ -223,7 +223,7 @@ fn with_pilots(study: &Study) -> Vec<usize> {
     let points = |stage: &Stage| points(&study.cells()[stage.range.clone()]);
     let own = (0..stages.len()).filter(|i| stages[*i].level.is_none());
     let largest = own.max_by_key(|i| points(&stages[*i]));
-    // Nobody knows yet who runs at finer levels.
+    // Which members run at finer levels is not known yet.
     let certain: Vec<usize> = (0..stages.len()).filter(|i| !stages[*i].is_selective()).collect();
     // Counted backwards.
     let spread = certain.iter().copied().rev().step_by(certain.len().div_ceil(MAX_PILOTS).max(1));
@@ -233,14 +233,14 @@ fn with_pilots(study: &Study) -> Vec<usize> {
     chosen
 }
 
-/// The stage of most nodes among those at which nobody knows yet who runs.
+/// The stage of most nodes among those of which the members are not known yet.
 fn finest(study: &Study) -> Option<usize> {
     let points = |i: &usize| study.spec_of(&study.stages()[*i]).map_or(0, |spec| spec.points);
     (0..study.stages().len()).filter(|i| study.stages()[*i].is_selective()).max_by_key(points)
 }
 
 /// Nodes of the members of `spec`, and how many of them are resident at once; a GPU is not opened for that.
-fn slots_at(spec: &Spec, choice: &Choice) -> Result<(usize, Option<usize>)> {
+fn slots_at(spec: &Spec, choice: &ChosenBackend) -> Result<(usize, Option<usize>)> {
     let slots = match choice.device().kind() {
         DeviceKind::Cpu => Some(choice.open(spec, spec.points)?.0.slots()),
         DeviceKind::Gpu => None,
@@ -249,7 +249,7 @@ fn slots_at(spec: &Spec, choice: &Choice) -> Result<(usize, Option<usize>)> {
 }
 
 impl Pilot {
-    fn add(&mut self, seen: &pilot::Seen) {
+    fn add(&mut self, seen: &pilot::PilotResult) {
         self.members += seen.members;
         self.ended += seen.left;
         self.failed += seen.failed;

@@ -1,8 +1,8 @@
 //! Pilots: a few members of a cohort, run through the loop of every run, as far as a fixed amount of work goes.
 //!
-//! Work is counted in updates of nodes, never in time: what a pilot finds must not depend on the speed of the machine or
-//! on what else it does. So that every pilot stops at the same point, its members go to a common number of steps, which
-//! doubles until the work is done ([`Rationed`]). Only the time that this takes is measured by the clock.
+//! Work is counted in updates of nodes, never in time: what a pilot finds must not depend on the speed of the machine
+//! or on what else it does. So that every pilot stops at the same point, its members go to a common number of steps,
+//! which doubles until the work is done ([`Rationed`]). Only the time that this takes is measured by the clock.
 
 use std::{
     cell::Cell as Flag,
@@ -70,7 +70,7 @@ impl CohortWork {
 
 /// The result of one pilot.
 #[derive(Clone, Debug)]
-pub struct Seen {
+pub struct PilotResult {
     pub members: u64,
     /// Members that have ended, and the steps that they made.
     pub left: u64,
@@ -93,9 +93,9 @@ pub struct Seen {
     pub ended: Vec<Outcome>,
 }
 
-impl Seen {
-    pub fn new(members: u64) -> Seen {
-        Seen {
+impl PilotResult {
+    pub fn new(members: u64) -> PilotResult {
+        PilotResult {
             members,
             left: 0,
             failed: 0,
@@ -127,7 +127,7 @@ enum End {
 
 /// Receives the members of a pilot, and ends it.
 struct PilotSink<'a> {
-    seen: Seen,
+    seen: PilotResult,
     limits: &'a Limits<'a>,
     /// Set by the back end once the work is done.
     is_done: &'a Flag<bool>,
@@ -302,7 +302,7 @@ pub struct CohortSample {
     /// The cost of the whole cohort.
     pub work: CohortWork,
     /// The pilots, each larger than the one before.
-    pub pilots: Vec<Seen>,
+    pub pilots: Vec<PilotResult>,
     /// Bytes of the rows of a member at its end, and in the largest pilot.
     pub rows: [f64; 2],
     /// Whether states were read back for rows.
@@ -319,7 +319,7 @@ pub fn sample(
 ) -> Result<CohortSample> {
     let own: Vec<Option<Vec<u64>>> = cohort.iter().map(|cell| cell.spec.only.clone()).collect();
     let all: u64 = cohort.iter().map(|cell| cell.spec.member_count()).sum();
-    let mut pilots: Vec<Seen> = Vec::new();
+    let mut pilots: Vec<PilotResult> = Vec::new();
     let mut count = (backend.abreast() as u64).min(all);
     // The second pilot runs to its end, so that it does not matter in which order its members are admitted.
     let mut budget = limits.work;
@@ -337,7 +337,7 @@ pub fn sample(
     cohort.iter_mut().zip(own).for_each(|(cell, only)| cell.spec.only = only);
     let ended = pilots.iter().rfind(|seen| seen.left > 0);
     let steps = ended.map(|seen| seen.steps as f64 / seen.left as f64);
-    let each = |count: fn(&Seen) -> usize| ended.map(|seen| count(seen) as f64 / seen.left as f64);
+    let each = |count: fn(&PilotResult) -> usize| ended.map(|seen| count(seen) as f64 / seen.left as f64);
     let [most_series, most_snapshots] = most_rows(cohort);
     let work = CohortWork {
         members: all as f64,
@@ -365,13 +365,13 @@ fn pilot(
     backend: &mut dyn Backend,
     (count, budget): (u64, f64),
     limits: &Limits<'_>,
-) -> Result<(End, Seen)> {
+) -> Result<(End, PilotResult)> {
     let is_done = Flag::new(false);
     let mut rationed = Rationed::new(backend, points(cohort), budget, &is_done);
     if budget == f64::INFINITY {
         rationed.ration = u32::MAX;
     }
-    let mut watch = PilotSink { seen: Seen::new(count), limits, is_done: &is_done, end: End::Complete };
+    let mut watch = PilotSink { seen: PilotResult::new(count), limits, is_done: &is_done, end: End::Complete };
     let started = Instant::now();
     let ended = simulate(cohort, precision, &mut rationed, 0, &mut watch);
     let (work, dispatches) = (rationed.work, rationed.dispatches);
@@ -381,7 +381,7 @@ fn pilot(
     }
     // How far it came depends on the machine, so nothing of it counts.
     if end == End::GivenUp {
-        seen = Seen::new(count);
+        seen = PilotResult::new(count);
     }
     (seen.seconds, seen.work, seen.dispatches) = (started.elapsed().as_secs_f64(), work, dispatches);
     Ok((end, seen))
@@ -405,8 +405,8 @@ fn most_rows(cohort: &[Cell]) -> [f64; 2] {
 }
 
 /// The cost of `all` members from that of the pilots, each scaled to its end.
-fn extrapolated(pilots: &[Seen], all: u64, cost: impl Fn(&Seen) -> f64) -> Option<f64> {
-    let whole = |seen: &Seen| (seen.share > 0.0).then(|| cost(seen) / seen.share.min(1.0));
+fn extrapolated(pilots: &[PilotResult], all: u64, cost: impl Fn(&PilotResult) -> f64) -> Option<f64> {
+    let whole = |seen: &PilotResult| (seen.share > 0.0).then(|| cost(seen) / seen.share.min(1.0));
     let known: Vec<(f64, f64)> = pilots.iter().filter_map(|seen| Some((seen.members as f64, whole(seen)?))).collect();
     let (members, most) = *known.last()?;
     let each = match known[..] {
@@ -490,13 +490,13 @@ mod tests {
         assert!(chosen[0] < 100 && chosen[12] > 880, "{chosen:?}");
     }
 
-    fn seen(members: u64, share: f64, seconds: f64) -> Seen {
-        Seen { share, seconds, ..Seen::new(members) }
+    fn seen(members: u64, share: f64, seconds: f64) -> PilotResult {
+        PilotResult { share, seconds, ..PilotResult::new(members) }
     }
 
     #[test]
     fn costs_are_extrapolated_from_the_two_largest_pilots() {
-        let of = |pilots: &[Seen], all| extrapolated(pilots, all, |seen| seen.seconds);
+        let of = |pilots: &[PilotResult], all| extrapolated(pilots, all, |seen| seen.seconds);
         // A fixed cost of 0.3 s, and 0.01 s per member.
         let pilots = [seen(10, 1.0, 0.4), seen(110, 1.0, 1.4)];
         assert!((of(&pilots, 1010).unwrap() - 10.4).abs() < 1e-12);

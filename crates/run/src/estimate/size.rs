@@ -8,7 +8,7 @@ use curvelax_ensemble::{
 };
 use curvelax_flow::scheme::{member, state::STATE_FIELDS};
 use curvelax_study::results::{
-    explained::{CONSIDERED, DRAWN, FeaturedMember, LEAST_MEMBERS, PICTURED, TIMES},
+    explained::{CONSIDERED, DRAWN, FeaturedMember, MIN_MEMBERS, PICTURED, TIMES},
     tally::Rate,
 };
 
@@ -20,8 +20,8 @@ pub const MANY_ROWS: u64 = 4_000_000;
 const POOL_NUMBERS: usize = STATE_FIELDS + 4;
 /// The same while a checkpoint is saved: the paused member, and its bytes.
 const KEPT_NUMBERS: usize = 2 * STATE_FIELDS;
-/// Bytes per node that is drawn of the page and its pictures: the digits of the portraits, twice, and of the gallery, three
-/// times. 26 kB a node were measured in all at 100 to 600 nodes, of which [`PORTRAIT_COPIES`] are 19.
+/// Bytes per node that is drawn of the page and its pictures: the digits of the portraits, twice, and of the gallery,
+/// three times. 26 kB a node were measured in all at 100 to 600 nodes, of which [`PORTRAIT_COPIES`] are 19.
 const PAGE_BYTES: usize = 7_000;
 /// Copies of the nodes of the members drawn.
 const PORTRAIT_COPIES: usize = 3;
@@ -75,7 +75,7 @@ pub fn disk(cells: &[Cell], members: u64, rated: f64, series: f64, nodes: f64) -
 /// Bytes of what explains the times, if cells have enough members: the table, and dots in pictures.
 fn explained(features: f64, cells: f64, members: f64) -> (f64, f64) {
     let rows = TIMES.len() as f64 * cells;
-    match members < LEAST_MEMBERS as f64 * cells {
+    match members < MIN_MEMBERS as f64 * cells {
         true => (rows * EXPLAINED_ROW, 0.0),
         false => (rows * features * EXPLAINED_ROW, members.min(DRAWN as f64) * PICTURED as f64 * DOT_BYTES),
     }
@@ -140,8 +140,8 @@ fn numbers(count: usize) -> u64 {
 /// The peak is at the end of the run, with a full pool and the tally, or after it, with the statistics and the charts
 /// but no pool. For each member the tally has its time and two numbers of half size about its mesh; for a fraction
 /// `rated` also its rate and that of theory. Times are sorted in place, and rates one number at a time; the number that
-/// is drawn replaces them. A chart sorts the numbers that it shows. Before that, the times of the first members of a cell
-/// are [explained](explaining).
+/// is drawn replaces them. A chart sorts the numbers that it shows. Before that, the times of the first members of a
+/// cell are [explained](explaining).
 pub fn memory(
     program: u64,
     members: u64,
@@ -164,8 +164,8 @@ pub fn memory(
     program + tally + (resident + portraits).max(reporting)
 }
 
-/// Bytes of the first members of a cell, each with so many features, while it is explained what their times depend on. Of
-/// those that have times, a fraction `timed`, the numbers are copied.
+/// Bytes of the first members of a cell, each with so many features, while it is explained what their times depend on.
+/// Of those that have times, a fraction `timed`, the numbers are copied.
 pub fn explaining(members_of_cell: u64, features: usize, timed: f64) -> u64 {
     let numbers = (features * size_of::<f64>()) as f64;
     let each = size_of::<FeaturedMember>() as f64 + numbers * (1.0 + EXPLAINED_COPIES * timed);

@@ -23,7 +23,7 @@ use curvelax_study::{
 
 /// Output on stdout for a completed run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Form {
+pub enum ResultFormat {
     /// A table and some lines for people.
     Overview,
     /// One document for programs.
@@ -81,8 +81,9 @@ fn as_parquet(
 }
 
 impl Complete<'_> {
-    /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict. `files` and `store`
-    /// hold the results of the members; `shard` is [what a merge needs besides them](curvelax_files::state::shard).
+    /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict.
+    /// `files` and `store` hold the results of the members; `shard` is [what a merge needs besides
+    /// them](curvelax_files::state::shard).
     ///
     /// # Errors
     /// If only the pictures cannot be written, the tables are published all the same, and the error says so.
@@ -92,7 +93,7 @@ impl Complete<'_> {
         mut files: Vec<PartFile>,
         store: Option<PartFolder>,
         shard: Option<&[u8]>,
-        form: Form,
+        form: ResultFormat,
     ) -> Result<(String, RunVerdict)> {
         let Complete { spec, platform, mut tally, films, warnings, started, wall } = self;
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
@@ -144,8 +145,8 @@ impl Complete<'_> {
         })?;
         let (folder, files) = (folder.path(), &names[..]);
         let text = match form {
-            Form::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
-            Form::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
+            ResultFormat::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
+            ResultFormat::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
         };
         Ok((text, RunVerdict::new(provenance, Some(statistics))))
     }

@@ -7,7 +7,7 @@ use curvelax_curve::polygon;
 use curvelax_draw::{
     medium::Medium,
     svg::{Svg, closed_path, coordinate, dots},
-    width::shortened,
+    width::{shortened, shortened_inside, width},
 };
 use curvelax_ensemble::study::PORTRAITS;
 use curvelax_files::portraits::Film;
@@ -16,11 +16,13 @@ use curvelax_files::portraits::Film;
 pub const MAX_PANELS: usize = PORTRAITS;
 
 /// Maximum characters of the name of a member.
-const MAX_NAME: usize = 24;
+const MAX_NAME: usize = 120;
 const COLUMNS: usize = 4;
 /// Width and maximum height of a panel on a screen in pixels, and the least on paper.
 const SIDE: f64 = 200.0;
-const LEAST_SIDE: f64 = 170.0;
+const MIN_SIDE: f64 = 170.0;
+/// The least on a page, where the picture is as wide as a chart.
+const MIN_SIDE_ON_PAGE: f64 = 150.0;
 /// Size of text.
 pub(super) const SIZE: f64 = 12.0;
 const MIN_HEIGHT: f64 = 100.0;
@@ -98,10 +100,12 @@ pub(super) fn style(medium: Medium) -> String {
 pub(super) fn columns(medium: Medium, count: usize) -> (usize, f64) {
     match medium {
         Medium::Screen => (count.clamp(MIN_COLUMNS, COLUMNS), SIDE),
-        Medium::Paper(width) => {
-            let room = width - 2.0 * MARGIN + GAP;
-            let most = ((room / (LEAST_SIDE + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
-            let columns = count.clamp(MIN_COLUMNS, most);
+        Medium::Page | Medium::Paper(_) => {
+            let room = medium.width() - 2.0 * MARGIN + GAP;
+            let least = if medium.is_screen() { MIN_SIDE_ON_PAGE } else { MIN_SIDE };
+            let most = ((room / (least + GAP)) as usize).clamp(MIN_COLUMNS, COLUMNS);
+            // Full rows, if that is possible: four are two by two.
+            let columns = count.div_ceil(count.div_ceil(most).max(1)).clamp(MIN_COLUMNS, most);
             (columns, room / columns as f64 - GAP)
         }
     }
@@ -153,10 +157,10 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     svg.rectangle("back", DVec2::ZERO, DVec2::new(width, height), 0.0);
     let legend = match rests {
         true => "dashed: Wulff shape, grey: start, colour: end",
-        false => "grey: start, light: on the way, colour: end",
+        false => "grey: start, light: in between, colour: end",
     };
     match medium {
-        Medium::Screen => {
+        Medium::Screen | Medium::Page => {
             svg.text("head", DVec2::new(MARGIN, 30.0), "Before, during and after");
             svg.text("note end", DVec2::new(width - MARGIN, 30.0), legend);
         }
@@ -227,12 +231,12 @@ fn draw_panel(
     let Film { status, points, .. } = panel.film;
     svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
-    let mut name = panel.film.name(MAX_NAME);
+    let mut across = String::new();
     if let Some((low, high)) = panel.bounds() {
         let own = (high - low).max_element();
         let scale = layout.scale(own);
         if layout.common.is_none() {
-            name += &format!(", {}{unit} across", rounded(own));
+            across = format!(", {}{unit} across", rounded(own));
         }
         // y grows downwards in SVG.
         let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
@@ -250,6 +254,8 @@ fn draw_panel(
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
+    let room = layout.side() - width(&across, SIZE);
+    let name = shortened_inside(&panel.film.name(MAX_NAME), SIZE, room) + &across;
     svg.text("middle", below, &shortened(&name, SIZE, layout.side()));
     svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
     let lines = if cell.is_empty() { 1.0 } else { 2.0 };

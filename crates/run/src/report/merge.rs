@@ -13,7 +13,7 @@ use std::{
     time::Duration,
 };
 
-use super::{Form, complete::Complete};
+use super::{ResultFormat, complete::Complete};
 use curvelax_base::{
     error::{Error, Result, without_controls},
     input::{self, MAX_LINE},
@@ -31,7 +31,7 @@ use curvelax_files::{
     state::shard::{FinishedShard, Found},
     zarr::{SnapshotStore, StoredMembers},
 };
-use curvelax_study::results::{RunVerdict, tally::Aside};
+use curvelax_study::results::{RunVerdict, tally::TallySupplement};
 
 /// Bytes read at once, from all shards together and at least from one.
 const BLOCKS: usize = 64 << 20;
@@ -168,7 +168,7 @@ impl Shards {
 
     /// A line for each incomplete shard, with its number and what there is instead; a single line for all those of
     /// which nothing is known.
-    pub fn told(&self) -> Vec<String> {
+    pub fn in_words(&self) -> Vec<String> {
         let line = |(index, path, why): &(Option<u64>, PathBuf, String)| match index {
             Some(index) if self.parts.contains_key(index) => None,
             Some(index) => Some(format!("shard {index}/{}: {}: {why}", self.count, path.display())),
@@ -189,7 +189,7 @@ impl Shards {
     ///
     /// # Errors
     /// [`Error::Request`] if a shard is missing or has changed since it was completed; `folder` is then left empty.
-    pub fn merge(self, folder: &OutputFolder, form: Form) -> Result<(String, RunVerdict)> {
+    pub fn merge(self, folder: &OutputFolder, form: ResultFormat) -> Result<(String, RunVerdict)> {
         self.check_complete()?;
         let Shards { parts, spec, .. } = self;
         let spec = &spec;
@@ -202,9 +202,10 @@ impl Shards {
             true => Some(join_stores(&parts, spec, folder)?),
             false => None,
         };
-        let (mut aside, mut films, mut warnings) = (Aside::default(), Vec::<Film>::new(), Vec::<String>::new());
+        let (mut supplement, mut films, mut warnings) =
+            (TallySupplement::default(), Vec::<Film>::new(), Vec::<String>::new());
         for FinishedShard { record, .. } in &parts {
-            aside.merge(&record.head.aside);
+            supplement.merge(&record.head.supplement);
             films.extend(record.head.films.iter().cloned());
             warnings.extend(record.warnings.iter().cloned());
         }
@@ -215,7 +216,7 @@ impl Shards {
         let none = || Error::Failed("a table of the shards was not merged".into());
         let levels = reader::levels((own(names::LEVELS).ok_or_else(none)?, own(names::EVENT_LEVELS)), spec)?;
         let rows = (own(names::SUMMARY).ok_or_else(none)?, own(names::EVENTS));
-        let tally = reader::rows(rows, spec, &levels, aside)?;
+        let tally = reader::rows(rows, spec, &levels, supplement)?;
         if tally.members() != spec.member_count() {
             let (found, all) = (tally.members(), spec.member_count());
             return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));
@@ -245,7 +246,7 @@ impl Shards {
         Err(Error::Request(format!(
             "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
             there as u64 + total(&missing),
-            listed(&self.told(), NAMED, "; ")
+            listed(&self.in_words(), NAMED, "; ")
         )))
     }
 }

@@ -21,7 +21,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-pub use complete::Form;
+pub use complete::ResultFormat;
 pub use progress::Progress;
 pub use stop::{Cause, Stop};
 
@@ -30,14 +30,16 @@ use curvelax_base::{
     error::{Error, Result},
     text::{duration, plural, quoted},
 };
-use curvelax_ensemble::{Ended, Extent, LevelRow, LevelTimes, SeriesRow, Sink, Snapshot, Spec, Standing, Study, Wish};
+use curvelax_ensemble::{
+    Ended, Extent, LevelRow, LevelTimes, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Spec, Study,
+};
 use curvelax_files::{
     OutputFolder,
     growing::Growing,
     portraits::Film,
     reader,
     state::{
-        checkpoint::{self, Head, Origin, Saved},
+        checkpoint::{self, CheckpointHead, Origin, Saved},
         outlines, shard,
     },
 };
@@ -50,7 +52,7 @@ use curvelax_study::{
 const SHARE_OF_STATES: u32 = 20;
 
 /// How a report works; the results do not depend on it.
-pub struct Manner {
+pub struct ReportOptions {
     /// When the run was asked for: what comes before its members takes time, too.
     pub since: Instant,
     /// Where the progress is shown.
@@ -59,8 +61,8 @@ pub struct Manner {
     pub every: Duration,
     /// The means to stop the run.
     pub stop: Stop,
-    /// Time after which a run that was asked to stop is ended even if it has not reached a point where all its work can be
-    /// saved.
+    /// Time after which a run that was asked to stop is ended even if it has not reached a point where all its work can
+    /// be saved.
     pub patience: Duration,
 }
 
@@ -98,10 +100,10 @@ pub struct RunReport {
 
 impl RunReport {
     /// Opens the tables of a study, and saves the first checkpoint, from which a killed run resumes.
-    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, manner: Manner) -> Result<RunReport> {
+    pub fn begin(folder: OutputFolder, study: &Study, origin: Origin, options: ReportOptions) -> Result<RunReport> {
         let growing = Growing::begin(&folder, study.spec(), study.points())?;
-        let mut report = RunReport::new(folder, growing, study, origin, manner);
-        let first = Standing { resident: Some(BTreeMap::new()), ..Standing::default() };
+        let mut report = RunReport::new(folder, growing, study, origin, options);
+        let first = RunProgress { resident: Some(BTreeMap::new()), ..RunProgress::default() };
         match outlines::save(&report.folder, &study.outlines()).and_then(|()| report.checkpoint(&first)) {
             Ok(()) => Ok(report),
             Err(error) => {
@@ -116,27 +118,32 @@ impl RunReport {
     ///
     /// # Errors
     /// [`Error::Request`] if its files are not those of the study.
-    pub fn resume(folder: OutputFolder, study: &Study, kept: Saved, manner: Manner) -> Result<(RunReport, Standing)> {
-        let Saved { head, standing, note } = kept;
-        let Head { origin, wall, stage, tables, store, rows, aside, films } = head;
+    pub fn resume(
+        folder: OutputFolder,
+        study: &Study,
+        kept: Saved,
+        options: ReportOptions,
+    ) -> Result<(RunReport, RunProgress)> {
+        let Saved { head, progress, note } = kept;
+        let CheckpointHead { origin, wall, stage, tables, store, rows, supplement, films } = head;
         let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
         }
         let levels = reader::levels(growing.levels(), study.spec())?;
-        let tally = reader::rows(growing.rows(), study.spec(), &levels, aside)?;
-        let mut report = RunReport::new(folder, growing, study, origin, manner);
+        let tally = reader::rows(growing.rows(), study.spec(), &levels, supplement)?;
+        let mut report = RunReport::new(folder, growing, study, origin, options);
         // Which members were to run at finer levels follows from their rows.
         let finer =
             study.stages().iter().zip(&mut report.stages).take(stage as usize + 1).filter(|(of, _)| of.is_selective());
         finer.for_each(|(of, members)| *members = study.members_of(of, &levels));
         (report.films, report.earlier, report.stage) = (films, wall, stage);
         (report.tally, report.levels, report.has_begun) = (tally, levels, true);
-        Ok((report, standing))
+        Ok((report, progress))
     }
 
-    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, manner: Manner) -> RunReport {
-        let Manner { since, progress, every, stop, patience } = manner;
+    fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, options: ReportOptions) -> RunReport {
+        let ReportOptions { since, progress, every, stop, patience } = options;
         stop.set_begun();
         RunReport {
             growing,
@@ -234,16 +241,16 @@ impl RunReport {
     }
 
     /// Returns the head of a checkpoint, once everything is on disk.
-    fn head(&mut self) -> Result<Head> {
+    fn head(&mut self) -> Result<CheckpointHead> {
         let (tables, store, rows) = self.growing.mark()?;
-        Ok(Head {
+        Ok(CheckpointHead {
             origin: self.origin.clone(),
             wall: self.wall(),
             stage: self.stage,
             tables,
             store,
             rows,
-            aside: self.tally.aside(),
+            supplement: self.tally.supplement(),
             films: self.films.clone(),
         })
     }
@@ -268,12 +275,12 @@ impl RunReport {
     }
 
     /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
-    pub fn finish(mut self, spec: &Spec, early: &[String], form: Form) -> Result<(String, RunVerdict)> {
+    pub fn finish(mut self, spec: &Spec, early: &[String], form: ResultFormat) -> Result<(String, RunVerdict)> {
         // All rows are written: a run killed from now on only needs to draw its pictures again.
         let next = self.rows() - self.before();
-        self.checkpoint(&Standing { next, resident: Some(BTreeMap::new()), ..Standing::default() })?;
+        self.checkpoint(&RunProgress { next, resident: Some(BTreeMap::new()), ..RunProgress::default() })?;
         let shard = match spec.shard {
-            Some(_) => Some(shard::to_bytes(&Head { rows: None, ..self.head()? }, self.points, early)?),
+            Some(_) => Some(shard::to_bytes(&CheckpointHead { rows: None, ..self.head()? }, self.points, early)?),
             None => None,
         };
         // Dropped in reverse order: the folder last, after its files.
@@ -309,7 +316,7 @@ impl Sink for RunReport {
         self.growing.add(ended)?;
         self.has_begun = true;
         self.tally.add_excess(outcome.cell, excess);
-        self.tally.add_aside(mollified, *unresolved);
+        self.tally.add_supplement(mollified, *unresolved);
         self.films.extend(portrait.as_ref().map(|portrait| Film::new(outcome, portrait)));
         Ok(())
     }
@@ -328,29 +335,29 @@ impl Sink for RunReport {
         }
     }
 
-    fn wish(&mut self) -> Wish {
+    fn next_request(&mut self) -> SinkRequest {
         let (since, took) = self.kept;
         match self.stop.asked() {
-            Some((cause, _)) => Wish::Stop(cause.error(&self.so_far())),
-            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => Wish::Checkpoint,
-            None => Wish::Continue,
+            Some((cause, _)) => SinkRequest::Stop(cause.error(&self.so_far())),
+            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => SinkRequest::Checkpoint,
+            None => SinkRequest::Continue,
         }
     }
 
-    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
+    fn checkpoint(&mut self, so_far: &RunProgress) -> Result<()> {
         let begun = Instant::now();
         let head = self.head()?;
         let known;
-        let resident = match &standing.resident {
+        let resident = match &so_far.resident {
             Some(resident) => resident,
             None => {
-                known = checkpoint::on_their_way(&self.folder, self.stage, standing);
+                known = checkpoint::in_progress(&self.folder, self.stage, so_far);
                 &known
             }
         };
-        self.folder.keep_state(&checkpoint::to_bytes(&head, standing, resident)?)?;
+        self.folder.keep_state(&checkpoint::to_bytes(&head, so_far, resident)?)?;
         self.growing.keep(true);
-        self.has_begun |= !standing.early.is_empty() || !resident.is_empty();
+        self.has_begun |= !so_far.early.is_empty() || !resident.is_empty();
         self.kept = (Instant::now(), begun.elapsed());
         self.stop.set_kept();
         Ok(())
@@ -380,15 +387,15 @@ mod tests {
 
     const PATIENCE: Duration = Duration::from_millis(300);
 
-    fn manner(stop: &Stop) -> Manner {
+    fn options(stop: &Stop) -> ReportOptions {
         let (since, every) = (Instant::now(), Duration::from_secs(1000));
-        Manner { since, progress: Progress::Quiet, every, stop: stop.clone(), patience: PATIENCE }
+        ReportOptions { since, progress: Progress::Quiet, every, stop: stop.clone(), patience: PATIENCE }
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {
         let study = Study::new(spec.clone()).unwrap();
         let origin = Origin::new(&study, platform()).unwrap();
-        RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, manner(stop)).unwrap()
+        RunReport::begin(OutputFolder::open(out, true).unwrap(), &study, origin, options(stop)).unwrap()
     }
 
     #[test]
@@ -397,8 +404,8 @@ mod tests {
         let study = Study::new(Spec { curves: 2, ..Spec::default() }).unwrap();
         let wall = |since: Instant, out: &str| {
             let folder = OutputFolder::open(&home.path().join(out), true).unwrap();
-            let manner = Manner { since, ..manner(&Stop::default()) };
-            RunReport::begin(folder, &study, Origin::new(&study, platform()).unwrap(), manner).unwrap().wall()
+            let options = ReportOptions { since, ..options(&Stop::default()) };
+            RunReport::begin(folder, &study, Origin::new(&study, platform()).unwrap(), options).unwrap().wall()
         };
         let now = Instant::now();
         // The clock may have begun less than an hour ago.
@@ -442,7 +449,7 @@ mod tests {
         let portrait = Portrait { before: triangle.clone(), frames: Vec::new(), after: triangle };
 
         let all = Spec { series: Some(0.1), snapshots: vec![0.0], tables: Tables::Parquet, ..Spec::default() };
-        let (overview, _) = report(&out, &all, Some(portrait)).finish(&all, &[], Form::Overview).unwrap();
+        let (overview, _) = report(&out, &all, Some(portrait)).finish(&all, &[], ResultFormat::Overview).unwrap();
         let tables = ["ensemble.csv", "explained.csv", "levels.csv", "mean_excess.csv", "members.csv"];
         let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
         let csv = [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat();
@@ -473,7 +480,7 @@ mod tests {
         );
 
         let few = Spec::default();
-        report(&out, &few, None).finish(&few, &["a warning".into()], Form::Overview).unwrap();
+        report(&out, &few, None).finish(&few, &["a warning".into()], ResultFormat::Overview).unwrap();
         assert_eq!(files(&out), [&always[..], &["summary.csv"]].concat());
         assert_eq!(files(&out.join("plots")), plots);
         assert!(fs::read_to_string(out.join("run.json")).unwrap().contains("a warning"));
@@ -485,18 +492,18 @@ mod tests {
         let (spec, stop) = (Spec::default(), Stop::default());
         let mut running = begun(&home.path().join("out"), &spec, &stop);
         running.member(&ended(0, None)).unwrap();
-        assert!(matches!(running.wish(), Wish::Continue) && running.progress(1, 256, 0.1).is_ok());
+        assert!(matches!(running.next_request(), SinkRequest::Continue) && running.progress(1, 256, 0.1).is_ok());
         let before = Instant::now();
         stop.ask(Cause::MaxTime);
         stop.ask(Cause::Interrupt);
-        let Wish::Stop(error) = running.wish() else { panic!("it goes on") };
+        let SinkRequest::Stop(error) = running.next_request() else { panic!("it continues") };
         assert_eq!(error.exit_code(), 75, "the first cause counts");
         assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
         assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
         // If this thread had to wait long, its patience may be over.
-        let goes_on = running.progress(1, 256, 0.1).is_ok();
-        assert!((goes_on || before.elapsed() > PATIENCE) && !stop.is_kept());
-        running.checkpoint(&Standing { next: 1, ..Standing::default() }).unwrap();
+        let continues = running.progress(1, 256, 0.1).is_ok();
+        assert!((continues || before.elapsed() > PATIENCE) && !stop.is_kept());
+        running.checkpoint(&RunProgress { next: 1, ..RunProgress::default() }).unwrap();
         assert!(stop.is_kept());
         std::thread::sleep(PATIENCE);
         assert_eq!(running.progress(1, 256, 0.1).unwrap_err().exit_code(), 75);
@@ -504,23 +511,23 @@ mod tests {
     }
 
     #[test]
-    fn a_state_is_wished_for_when_its_time_has_come() {
+    fn a_checkpoint_is_requested_when_it_is_due() {
         let home = tempfile::tempdir().unwrap();
         let (spec, stop) = (Spec::default(), Stop::default());
         let mut running = begun(&home.path().join("out"), &spec, &stop);
         let hour = Duration::from_secs(3600);
         running.every = hour;
         running.kept = (Instant::now(), Duration::ZERO);
-        assert!(matches!(running.wish(), Wish::Continue));
+        assert!(matches!(running.next_request(), SinkRequest::Continue));
         running.every = Duration::ZERO;
-        assert!(matches!(running.wish(), Wish::Checkpoint));
+        assert!(matches!(running.next_request(), SinkRequest::Checkpoint));
         // A checkpoint that took long is not saved again soon.
         running.kept.1 = hour;
-        assert!(matches!(running.wish(), Wish::Continue));
+        assert!(matches!(running.next_request(), SinkRequest::Continue));
     }
 
     #[test]
-    fn a_report_goes_on_from_its_state_to_the_same_bytes() {
+    fn a_report_continues_from_its_state_to_the_same_bytes() {
         let home = tempfile::tempdir().unwrap();
         let csv = Spec {
             curves: 3,
@@ -536,24 +543,24 @@ mod tests {
             let [straight, broken] = ["straight", "broken"].map(|way| home.path().join(name).join(way));
             let mut whole = begun(&straight, &spec, &Stop::default());
             (0..3).for_each(|member| whole.member(&ended(member, None)).unwrap());
-            whole.finish(&spec, &[], Form::Overview).unwrap();
+            whole.finish(&spec, &[], ResultFormat::Overview).unwrap();
 
             let mut first = begun(&broken, &spec, &Stop::default());
             first.member(&ended(0, None)).unwrap();
             let early = BTreeMap::from([(2, ended(2, None))]);
-            first.checkpoint(&Standing { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
+            first.checkpoint(&RunProgress { next: 1, early, resident: Some(BTreeMap::new()) }).unwrap();
             // Not in the checkpoint: to be cut off.
             first.member(&ended(1, None)).unwrap();
-            assert!(first.give_up(), "there is something to go on with");
+            assert!(first.give_up(), "there is something to continue with");
             let folder = OutputFolder::open_again(&broken).unwrap();
             let kept = checkpoint::find(&folder).unwrap().unwrap();
             assert_eq!(kept.note, None);
             let study = Study::new(spec.clone()).unwrap();
-            let (mut second, standing) = RunReport::resume(folder, &study, kept, manner(&Stop::default())).unwrap();
-            assert_eq!((standing.next, second.members()), (1, 1));
+            let (mut second, so_far) = RunReport::resume(folder, &study, kept, options(&Stop::default())).unwrap();
+            assert_eq!((so_far.next, second.members()), (1, 1));
             second.member(&ended(1, None)).unwrap();
-            second.member(&standing.early[&2]).unwrap();
-            second.finish(&spec, &[], Form::Overview).unwrap();
+            second.member(&so_far.early[&2]).unwrap();
+            second.finish(&spec, &[], ResultFormat::Overview).unwrap();
             let is_table = |name: &String| name.ends_with("csv") || name.ends_with("parquet");
             let tables: Vec<String> = files(&straight).into_iter().filter(is_table).collect();
             assert_eq!(tables.len(), if name == "csv" { 18 } else { 16 });

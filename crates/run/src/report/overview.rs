@@ -54,11 +54,11 @@ impl fmt::Display for Overview<'_> {
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("outlines", self.tally.mollified.outlines().unwrap_or_default()),
-            ("corners", self.tally.mollified.told().unwrap_or_default()),
+            ("smoothing", self.tally.mollified.smoothing().unwrap_or_default()),
             (self.statistics.time(), self.relaxation()),
             ("t_relax", self.raw()),
             ("error", self.error()),
-            ("nodes", self.tally.nodes.told().unwrap_or_default()),
+            ("nodes", self.tally.nodes.in_words().unwrap_or_default()),
             ("accuracy", self.accuracy()),
             ("rate", self.rate()),
             ("t_vanish", self.vanishing()),
@@ -103,8 +103,9 @@ impl Overview<'_> {
 
     fn relaxation(&self) -> String {
         let unit = unit(self.spec);
-        self.only_cell()
-            .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.statistics.of_limits))
+        self.only_cell().map_or(String::new(), |cell| {
+            unit + &times(self.statistics.times(cell), self.statistics.of_limits, "relaxed")
+        })
     }
 
     /// When the members of a single ensemble vanished, if any did.
@@ -159,7 +160,7 @@ impl Overview<'_> {
         // A shard has some of the members that it takes.
         let Some(goal) = self.spec.accuracy.filter(|_| self.spec.shard.is_none()) else { return String::new() };
         if let Some(lack) = Shortfall::of(self.spec, self.statistics) {
-            return lack.told();
+            return lack.in_words();
         }
         let of_each = if self.statistics.of_each { " for each member" } else { "" };
         let reached = rounded_beside(self.statistics.uncertainty(), goal);
@@ -184,8 +185,8 @@ impl Overview<'_> {
         }
         for cell in cells.iter().take(MAX_CELLS) {
             let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
-            let of_cell = times(self.statistics.times(cell), self.statistics.of_limits);
-            writeln!(f, "{:<11}{name}: {time} {}{of_cell}", cell.cell, unit(self.spec))?;
+            let of_cell = times(self.statistics.times(cell), self.statistics.of_limits, "relaxed");
+            writeln!(f, "{:<11}{name}: {time} {}{of_cell}", format!("cell {}", cell.cell), unit(self.spec))?;
             if self.statistics.of_limits {
                 writeln!(f, "{:<11}t_relax {}", "", raw(&cell.times, self.spec))?;
             }
@@ -237,7 +238,7 @@ impl Overview<'_> {
         for GroupStatistics { group, times: of } in groups.iter().take(MAX_CELLS) {
             let name = shortened(group, MAX_GROUP);
             let (time, of_limits) = (self.statistics.time(), self.statistics.of_limits);
-            let (cell, times) = (cell(of.cell), times(self.statistics.times(of), of_limits));
+            let (cell, times) = (cell(of.cell), times(self.statistics.times(of), of_limits, "relaxed"));
             writeln!(f, "{:<11}{property} {name}{cell}: {time} {}{times}", "group", unit(self.spec))?;
         }
         match groups.len().saturating_sub(MAX_CELLS) {
@@ -321,7 +322,7 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    median 0.5000 (range of 4, 0.3000 or more, covers 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that reached it; 2 censored
+t_relax    median 0.5000 (range of 4, 0.3000 or more, covers 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that relaxed; 2 censored
 error      discretisation not known: no member has times at n, n/√2 and n/2 nodes
 work       10 steps per member, Gauss-Seidel sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
@@ -398,25 +399,31 @@ results    out: summary.csv, run.json
             nodes(&tally)
         };
         assert_eq!(add(0, 100, true), None);
-        assert_eq!(add(1, 100, false).as_deref(), Some("the errors of 1 of 2 members are bounds"));
-        assert_eq!(add(2, 283, true).as_deref(), Some("1 of 3 members at up to n = 283; the errors of 1 are bounds"));
-        assert_eq!(add(3, 141, true).as_deref(), Some("2 of 4 members at up to n = 283; the errors of 1 are bounds"));
+        assert_eq!(add(1, 100, false).as_deref(), Some("t_error of 1 of 2 members is a wide bound"));
+        assert_eq!(
+            add(2, 283, true).as_deref(),
+            Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+        );
+        assert_eq!(
+            add(3, 141, true).as_deref(),
+            Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+        );
     }
 
     #[test]
-    fn nobody_relaxed_is_said_so() {
+    fn an_overview_says_that_no_member_relaxed() {
         let text = overview(&Tally::default());
-        assert!(text.contains("t_relax    none of 0 members reached it\n"), "{text}");
+        assert!(text.contains("t_relax    none of 0 members relaxed\n"), "{text}");
     }
 
     #[test]
     fn one_is_not_many() {
         let mut tally = Tally::default();
         tally.add(&outcome(0, Status::Relaxed, Some(0.3))).unwrap();
-        assert!(overview(&tally).contains("over 1 member that reached it\n"), "{}", overview(&tally));
+        assert!(overview(&tally).contains("over 1 member that relaxed\n"), "{}", overview(&tally));
         tally.cells[0] = Default::default();
         tally.add(&outcome(0, Status::Unfinished, None)).unwrap();
-        assert!(overview(&tally).contains("none of 1 member reached it\n"), "{}", overview(&tally));
+        assert!(overview(&tally).contains("none of 1 member relaxed\n"), "{}", overview(&tally));
         let one_thread = Platform { threads: Some(1), ..platform() };
         assert!(machine(&one_thread).contains(", 1 thread ("), "{}", machine(&one_thread));
         assert!(machine(&platform()).contains(", 2 threads ("), "{}", machine(&platform()));

@@ -24,7 +24,7 @@ pub enum Progress {
     /// On a terminal.
     Bar(ProgressBar, ProgressPace),
     /// To a function, with the members that have ended, all members, and the share of the work that is done.
-    Told(Box<dyn FnMut(u64, u64, f64)>),
+    Callback(Box<dyn FnMut(u64, u64, f64)>),
     /// In a file or a pipe, with the start of the run.
     Lines(Instant, ProgressLines, ProgressPace),
 }
@@ -50,8 +50,8 @@ impl ProgressPace {
     }
 }
 
-/// The time left if the share of the work that is done went from `before` to `share` in the time `elapsed`. None as long as
-/// nothing is known, and at the end, where it would be 0.
+/// The time left if the share of the work that is done went from `before` to `share` in the time `elapsed`. None as
+/// long as nothing is known, and at the end, where it would be 0.
 fn time_left(elapsed: Duration, before: f64, share: f64) -> Option<Duration> {
     if elapsed < SETTLED || share <= before {
         return None;
@@ -82,7 +82,7 @@ impl Progress {
         match self {
             Progress::Quiet => {}
             Progress::Bar(bar, pace) => show_bar(bar, pace, &members(done, total), share.clamp(0.0, 1.0)),
-            Progress::Told(tell) => tell(done, total, share),
+            Progress::Callback(tell) => tell(done, total, share),
             Progress::Lines(began, lines, pace) => {
                 let share = share.clamp(0.0, 1.0);
                 let left = pace.left(share);
@@ -97,7 +97,7 @@ impl Progress {
     /// long, and the line shows which one is running.
     pub fn step(&mut self, done: usize, total: usize, what: &str) {
         match self {
-            Progress::Quiet | Progress::Told(_) => {}
+            Progress::Quiet | Progress::Callback(_) => {}
             Progress::Bar(bar, pace) => show_bar(bar, pace, what, done as f64 / total.max(1) as f64),
             Progress::Lines(..) => {
                 let _ = writeln!(io::stderr().lock(), "{} of {total}: {what}", done + 1);

@@ -7,7 +7,7 @@ use curvelax_base::{
 use curvelax_curve::Perturbation;
 use curvelax_ensemble::{
     Drawn, Event, Spec,
-    request::spec::{Pace, Tau, Units},
+    request::spec::{FinalTime, Pace, Tau, Units},
 };
 use curvelax_statistics::{GoodnessOfFit, LogRank, PowerLaw};
 use curvelax_study::{
@@ -28,13 +28,19 @@ pub(super) const MAX_GROUP: usize = 60;
 /// The result of a log-rank test.
 pub(super) fn chi(test: &LogRank) -> String {
     let LogRank { statistic, degrees_of_freedom, p_value: p, .. } = test;
-    format!("{}, chi2 = {} ({degrees_of_freedom})", p_value(*p), significant(*statistic))
+    format!("{}, chi2 = {} with {}", p_value(*p), significant(*statistic), degrees(*degrees_of_freedom))
+}
+
+/// The degrees of freedom of a statistic.
+fn degrees(count: usize) -> String {
+    if count == 1 { "1 degree of freedom".into() } else { format!("{count} degrees of freedom") }
 }
 
 /// Describes the run in one line, without the swept keys.
 pub fn describe(spec: &Spec) -> String {
+    let time = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().time));
     let pace = match spec.pace() {
-        Pace::Fixed(Tau::Step(tau)) => ("tau", format!("tau = {tau:?}")),
+        Pace::Fixed(Tau::Step(tau)) => ("tau", format!("tau = {tau:?}{time}")),
         Pace::Fixed(Tau::Auto) => ("tau", "tau = auto".into()),
         Pace::Adaptive(tolerance) => ("adaptive", format!("adaptive {tolerance:?}")),
     };
@@ -56,7 +62,7 @@ pub fn describe(spec: &Spec) -> String {
         ("mobility", mobility(spec)),
         ("points", format!("n = {}", spec.points)),
         pace,
-        ("t-end", format!("t-end = {}", spec.t_end.clone().unwrap_or(spec.final_time().into()))),
+        ("t-end", format!("t-end = {}", in_time(&spec.t_end.clone().unwrap_or(spec.final_time().into()), &time))),
         ("seed", format!("seed {}", spec.seed)),
     ];
     let swept = |key: &str| spec.sweep.has(key);
@@ -67,6 +73,14 @@ pub fn describe(spec: &Spec) -> String {
     };
     let parts = parts.into_iter().filter(|(key, part)| has_one_value(key) && !part.is_empty()).map(|(_, part)| part);
     parts.collect::<Vec<_>>().join(", ")
+}
+
+/// A final time with its unit, if it is a number.
+fn in_time(t_end: &FinalTime, unit: &str) -> String {
+    match t_end {
+        FinalTime::At(_) => format!("{t_end}{unit}"),
+        _ => t_end.to_string(),
+    }
 }
 
 /// The mobility with its unit; nothing if there is neither.
@@ -101,7 +115,7 @@ pub(super) fn vanished(spec: &Spec, cell: &CellStatistics) -> Option<String> {
     let EventStatistics { times: of, stopped, .. } = &cell.vanishing;
     match (of.sample.events(), *stopped) {
         (0, _) => None,
-        (_, 0) => Some(unit(spec) + &times(of, false)),
+        (_, 0) => Some(unit(spec) + &times(of, false, "vanished")),
         (known, stopped) => {
             let stopped = count(stopped, "member");
             Some(format!("reached by {known}; no statistics, as {stopped} stopped when relaxed"))
@@ -120,7 +134,7 @@ pub(super) fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Itera
             (0, _) | (_, 0) => {
                 let limit = if of.limits.is_some() { "limit " } else { "" };
                 let unit = unit(spec);
-                format!("{}: {limit}{unit}{}{error}", event.name, times(of.judged(), of.limits.is_some()))
+                format!("{}: {limit}{unit}{}{error}", event.name, times(of.judged(), of.limits.is_some(), "reached it"))
             }
             (stopped, known) => {
                 let stopped = count(stopped, "member");
@@ -139,8 +153,8 @@ pub(super) fn unit(spec: &Spec) -> String {
 /// What stands behind limits: the times at the nodes of the run.
 pub(super) fn raw(of: &TimeStatistics, spec: &Spec) -> String {
     let Some(mean) = of.mean else { return String::new() };
-    let median = of.median().map_or("not reached by half of the members".into(), significant);
-    format!("raw, at n = {}: median {median}, mean {}", spec.points, significant(mean.value))
+    let median = of.median().map_or("no median".into(), |median| format!("median {}", significant(median)));
+    format!("of this run, at n = {}: {median}, mean {}", spec.points, significant(mean.value))
 }
 
 /// The name of a member: that of its outline, and what distinguishes its cell.
@@ -152,7 +166,7 @@ pub fn member_name(spec: &Spec, member: &MemberTime) -> String {
 }
 
 /// What the clock of moving members shows if their relaxation times are limits.
-pub const RAW_CLOCK: &str = "t is raw, at the nodes of the run";
+pub const RAW_CLOCK: &str = "t is that of the run, not the limit";
 
 /// The limit of a member behind its status.
 pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
@@ -171,7 +185,8 @@ pub fn member_time(member: &MemberTime) -> String {
     }
 }
 
-/// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of ten.
+/// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of
+/// ten.
 fn beside(t: f64, error: f64) -> (String, String) {
     let digits = 1 - error.log10().floor() as i32;
     match error > 0.0 && (1e-4..1e6).contains(&t.abs()) && (0..=12).contains(&digits) {
@@ -183,13 +198,16 @@ fn beside(t: f64, error: f64) -> (String, String) {
     }
 }
 
-/// Median and mean of the times of a cell, and how reliable they are; limits have intervals for more than sampling.
-pub(super) fn times(of: &TimeStatistics, of_limits: bool) -> String {
+/// Median and mean of the times at which members `did` something, and how reliable they are; limits have intervals for
+/// more than sampling.
+pub(super) fn times(of: &TimeStatistics, of_limits: bool, did: &str) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
-    let Some(mean) = of.mean else { return format!("none of {members} {} reached it", plural(members, "member")) };
-    let median = of.median().map_or("not reached by half of the members".into(), significant);
+    let Some(mean) = of.mean else { return format!("none of {members} {} {did}", plural(members, "member")) };
+    let half = || format!("no median, as fewer than half of the members {did}");
+    let median = of.median().map_or_else(half, |median| format!("median {}", significant(median)));
     let both = if of_limits { ", for sampling and discretisation" } else { "" };
-    let interval = of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.told(significant)));
+    let interval =
+        of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let censored = match members - known {
@@ -197,7 +215,7 @@ pub(super) fn times(of: &TimeStatistics, of_limits: bool) -> String {
         censored => format!("; {censored} censored"),
     };
     format!(
-        "median {median}{interval}, mean {least}{}{error} over {known} {} that reached it{censored}",
+        "{median}{interval}, mean {least}{}{error} over {known} {} that {did}{censored}",
         significant(mean.value),
         plural(known, "member")
     )
@@ -266,7 +284,7 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
         let error = exponent_error.map_or(String::new(), |error| format!(", standard error {}", significant(error)));
         let exponent = format!("{}{error}", significant(exponent));
         let fit = goodness.map(|GoodnessOfFit { statistic, degrees_of_freedom, p_value: p }| {
-            format!("chi2 = {} ({degrees_of_freedom}), {}", significant(statistic), p_value(p))
+            format!("chi2 = {} with {}, {}", significant(statistic), degrees(degrees_of_freedom), p_value(p))
         });
         match fit {
             Some(fit) if of.is_rejected() => {
@@ -281,7 +299,7 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
         }
     });
     let fitted = fitted.unwrap_or_else(|| format!("no power of {scale} is fitted: too few cells have a median"));
-    let left_out = (!of.left_out.is_empty()).then(|| format!("not in the fit: {}", of.told()));
+    let left_out = (!of.left_out.is_empty()).then(|| format!("not in the fit: {}", of.in_words()));
     [fitted].into_iter().chain(left_out).collect()
 }
 
@@ -370,8 +388,11 @@ mod tests {
             left_out: Vec::new(),
         };
         let holds = "median t_relax scales as amplitude to the power -0.2500, standard error 0.01000";
-        assert_eq!(law(&of(Some(0.25), 5), "t_relax"), [format!("{holds}; chi2 = 12.50 (3), p = 0.25")]);
-        let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 (3), p = 1.0e-7; the nearest power is -0.2500, \
+        assert_eq!(
+            law(&of(Some(0.25), 5), "t_relax"),
+            [format!("{holds}; chi2 = 12.50 with 3 degrees of freedom, p = 0.25")]
+        );
+        let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 with 3 degrees of freedom, p = 1.0e-7; the nearest power is -0.2500, \
                         standard error 0.01000";
         assert_eq!(law(&of(Some(1e-7), 5), "t_relax"), [rejected]);
         assert_eq!(law(&of(None, 2), "t_relax"), [format!("{holds}; two cells do not test it")]);

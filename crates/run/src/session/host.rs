@@ -1,27 +1,27 @@
-//! Who has a run carried out.
+//! The caller of a run.
 
-use crate::report::{Form, Manner, Stop};
+use crate::report::{ReportOptions, ResultFormat, Stop};
 use curvelax_base::error::Result;
 use curvelax_ensemble::Snapshot;
 
-/// Who has a run carried out: a user at a command line, or a program.
+/// The caller of a run: a user at a command line, or a program.
 pub trait Host {
-    /// Hears a line about the run: `note: …`, `warning: …`, or what happens now.
+    /// Receives a line about the run: `note: …`, `warning: …`, or what happens now.
     fn say(&self, line: &str);
     /// The form of the text at the end.
-    fn form(&self) -> Form;
+    fn form(&self) -> ResultFormat;
     /// Makes a run stoppable from now on.
     ///
     /// # Errors
     /// If the system has no means for it.
-    fn manner(&self) -> Result<Manner>;
-    /// The manner of a run that `stop` stops.
-    fn manner_with(&self, stop: Stop) -> Manner;
+    fn options(&self) -> Result<ReportOptions>;
+    /// The options of a run that `stop` stops.
+    fn options_with(&self, stop: Stop) -> ReportOptions;
     /// Asked several times a second while a run is prepared; an error ends it.
     ///
     /// # Errors
     /// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or the like, if the host wants no run any more.
-    fn go_on(&self) -> Result<()> {
+    fn may_continue(&self) -> Result<()> {
         Ok(())
     }
     /// Sees snapshots of a member, in time order and before they are stored. Those that a resumed run has stored

@@ -1,9 +1,9 @@
 //! From a spec to a finished folder of results: what the command line and the Python package share.
 //!
-//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`RunPlan`] makes the choices that it leaves to
-//! rounds; a [`PlacedStudy`] is the checked plan, with a back end for each stage; a session carries it out and reports.
-//! [`begin`] starts a run, [`resume()`] continues one, and both end here: a run that loses a GPU which nobody asked for is
-//! resumed on the CPU.
+//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`RunPlan`] makes the choices that it leaves
+//! to rounds; a [`PlacedStudy`] is the checked plan, with a back end for each stage; a session carries it out and
+//! reports. [`begin`] starts a run, [`resume()`] continues one, and both end here: a run that loses a GPU that was not
+//! requested is resumed on the CPU.
 
 mod host;
 mod placed;
@@ -19,7 +19,7 @@ pub use plan::RunPlan;
 pub use resume::{Begun, ResumePlace, begun};
 pub use run::Completed;
 
-use crate::report::Manner;
+use crate::report::ReportOptions;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Study, request::spec::BackendChoice};
 use curvelax_files::{Existing, OutputFolder};
@@ -33,11 +33,11 @@ pub fn begin(
     placed: PlacedStudy,
     out: &Path,
     existing: Existing,
-    manner: Manner,
+    options: ReportOptions,
     host: &dyn Host,
 ) -> Result<Completed> {
     let folder = OutputFolder::open(out, existing)?;
-    complete(Session::begin(placed, folder, manner, host)?, host)
+    complete(Session::begin(placed, folder, options, host)?, host)
 }
 
 /// Resumes the run in the folder at `path`. `None` means that it is finished.
@@ -69,7 +69,7 @@ fn complete(session: Session, host: &dyn Host) -> Result<Completed> {
         Err(Error::Device(fault)) if falls_back => {
             let why = format!("the GPU failed: {fault}");
             host.say(&format!("note: on the CPU from here on: {why}"));
-            match Begun::open(&path)?.resume_on_cpu(why, host.manner_with(stop), host)? {
+            match Begun::open(&path)?.resume_on_cpu(why, host.options_with(stop), host)? {
                 Some(session) => session.carry_out(host),
                 None => Err(Error::Device(fault)),
             }

@@ -4,7 +4,7 @@ use super::{host::Host, plan::RunPlan};
 use curvelax_backend::{Backend, DeviceKind};
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Cell, Study};
-use curvelax_study::placement::{self, Choice, OpeningWatch, Platform};
+use curvelax_study::placement::{self, ChosenBackend, OpeningWatch, Platform};
 
 /// A plan that this machine can carry out: the study, with the back end of each stage.
 pub struct PlacedStudy {
@@ -13,7 +13,7 @@ pub struct PlacedStudy {
     /// The resolved study, with everything that the choices decided.
     pub study: Study,
     /// The back ends of its stages, not yet opened.
-    pub choices: Vec<Choice>,
+    pub choices: Vec<ChosenBackend>,
 }
 
 /// The back end of the first cells of a study itself.
@@ -44,8 +44,8 @@ impl PlacedStudy {
         PlacedStudy { choices, ..self }
     }
 
-    /// Opens the back end of the first cells of the study itself. If the GPU that was chosen cannot be used, returns the
-    /// same plan on the CPU.
+    /// Opens the back end of the first cells of the study itself. If the GPU that was chosen cannot be used, returns
+    /// the same plan on the CPU.
     pub(super) fn open(self, host: &dyn Host) -> Result<(PlacedStudy, FirstBackend)> {
         let (cells, choice) = self.first();
         let (backend, platform) = open(cells, choice, host)?;
@@ -62,7 +62,7 @@ impl PlacedStudy {
     }
 
     /// The first cells of the study itself, and their back end.
-    fn first(&self) -> (&[Cell], &Choice) {
+    fn first(&self) -> (&[Cell], &ChosenBackend) {
         let own = self.study.own_stage();
         (&self.study.cells()[self.study.stages()[own].range.clone()], &self.choices[own])
     }
@@ -85,6 +85,6 @@ impl PlacedStudy {
 }
 
 /// Opens the back end chosen for a cohort, and tells the host.
-pub(super) fn open(cohort: &[Cell], choice: &Choice, host: &dyn Host) -> Result<(Box<dyn Backend>, Platform)> {
-    choice.open_watched(cohort, &OpeningWatch { tell: &|what| host.say(what), go_on: &|| host.go_on() })
+pub(super) fn open(cohort: &[Cell], choice: &ChosenBackend, host: &dyn Host) -> Result<(Box<dyn Backend>, Platform)> {
+    choice.open_watched(cohort, &OpeningWatch { tell: &|what| host.say(what), may_continue: &|| host.may_continue() })
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::host::Host;
-use crate::report::Manner;
+use crate::report::ReportOptions;
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Outlines, Spec, request::spec::BackendChoice};
 use curvelax_study::accuracy;
@@ -20,18 +20,18 @@ pub struct RunPlan {
 
 impl RunPlan {
     /// Plans `request`: replaces `accuracy` by the nodes, tolerance and members that reach it, found in rounds that
-    /// `manner` may stop.
+    /// `options` may stop.
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if it cannot be reached, and
     /// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or
     /// [`Error::Stopped`](curvelax_base::error::Error::Stopped) if asked to stop.
-    pub fn new(request: Spec, manner: Option<&Manner>, host: &dyn Host) -> Result<RunPlan> {
+    pub fn new(request: Spec, options: Option<&ReportOptions>, host: &dyn Host) -> Result<RunPlan> {
         let stopped = || {
-            if let Err(error) = host.go_on() {
+            if let Err(error) = host.may_continue() {
                 return Some(error);
             }
-            let (cause, _) = manner?.stop.asked()?;
+            let (cause, _) = options?.stop.asked()?;
             Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
         };
         let spec = accuracy::plan(request, |round| host.say(&round.to_string()), stopped)?;

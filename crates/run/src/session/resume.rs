@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{host::Host, placed::PlacedStudy, plan::RunPlan, run::Session};
-use crate::report::Manner;
+use crate::report::ReportOptions;
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
@@ -12,7 +12,7 @@ use curvelax_ensemble::{Outlines, Spec, Study, request::spec::BackendChoice};
 use curvelax_files::{
     OutputFolder, names, reader,
     state::{
-        checkpoint::{self, Head, Origin, Saved},
+        checkpoint::{self, CheckpointHead, Origin, Saved},
         outlines,
     },
 };
@@ -77,7 +77,7 @@ impl Begun {
                 "--resume: the run in {path} has another spec: {key} is {there} there and {here} here; use another folder"
             )));
         }
-        if let Some(Saved { head: Head { origin, .. }, .. }) = &self.saved {
+        if let Some(Saved { head: CheckpointHead { origin, .. }, .. }) = &self.saved {
             // The outline of this name may be another one here.
             origin.check_outlines(study)?;
             let there = origin.platform.backend;
@@ -101,15 +101,15 @@ impl Begun {
             return Ok(None);
         };
         // Before a device is looked for, which takes time.
-        let manner = host.manner()?;
-        continued(folder, saved, place, manner, host).map(Some)
+        let options = host.options()?;
+        continued(folder, saved, place, options, host).map(Some)
     }
 
     /// The session that continues the run on the CPU, because of `why`; `None` if it is finished.
-    pub(super) fn resume_on_cpu(self, why: String, manner: Manner, host: &dyn Host) -> Result<Option<Session>> {
+    pub(super) fn resume_on_cpu(self, why: String, options: ReportOptions, host: &dyn Host) -> Result<Option<Session>> {
         let Begun { folder, saved: Some(saved) } = self else { return Ok(None) };
         let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
-        continued(folder, saved, place, manner, host).map(Some)
+        continued(folder, saved, place, options, host).map(Some)
     }
 }
 
@@ -118,7 +118,7 @@ fn continued(
     mut folder: OutputFolder,
     mut saved: Saved,
     place: ResumePlace,
-    manner: Manner,
+    options: ReportOptions,
     host: &dyn Host,
 ) -> Result<Session> {
     let path = folder.path().to_path_buf();
@@ -139,19 +139,19 @@ fn continued(
         .map_err(|error| origin.explain(error))?;
     let placed = match &place {
         ResumePlace { why: Some(_), .. } => placed.because("the GPU failed"),
-        // The spec of a run names its back end even if nobody did.
+        // The spec of a run names its back end even if the user did not.
         ResumePlace { backend: None, adapter: None, .. } => placed.because(&origin.platform.reason),
         _ => placed,
     };
     origin.check_outlines(&placed.study)?;
     settle(origin, &placed, place)?;
-    Session::resume(placed, folder, saved, manner, host)
+    Session::resume(placed, folder, saved, options, host)
 }
 
 /// Writes to the origin of a run where it continues.
 ///
 /// # Errors
-/// [`Error::Request`] if digits differ there and nobody asked for it.
+/// [`Error::Request`] if digits differ there, unless that was requested.
 fn settle(origin: &mut Origin, placed: &PlacedStudy, place: ResumePlace) -> Result<()> {
     let ResumePlace { backend, adapter, threads, why } = place;
     let began = origin.platform.clone();

@@ -6,17 +6,19 @@ use super::{
     host::Host,
     placed::{FirstBackend, PlacedStudy, open},
 };
-use crate::report::{Manner, RunReport, Stop};
+use crate::report::{ReportOptions, RunReport, Stop};
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
-use curvelax_ensemble::{Ended, Extent, Judged, LevelRow, SeriesRow, Sink, Snapshot, Standing, Study, Wish, simulate};
+use curvelax_ensemble::{
+    Ended, Extent, LevelRow, LevelSink, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Study, simulate,
+};
 use curvelax_files::{
     OutputFolder,
     state::checkpoint::{Origin, Saved},
 };
-use curvelax_study::{placement::Choice, results::RunVerdict};
+use curvelax_study::{placement::ChosenBackend, results::RunVerdict};
 
 /// A run that is complete.
 #[derive(Debug)]
@@ -35,16 +37,21 @@ pub struct Session {
     first: FirstBackend,
     report: RunReport,
     /// The progress in the report's current stage.
-    standing: Standing,
+    progress: RunProgress,
 }
 
 impl Session {
     /// Opens the back end of `placed`, and the report in `folder`.
-    pub fn begin(placed: PlacedStudy, folder: OutputFolder, manner: Manner, host: &dyn Host) -> Result<Session> {
+    pub fn begin(
+        placed: PlacedStudy,
+        folder: OutputFolder,
+        options: ReportOptions,
+        host: &dyn Host,
+    ) -> Result<Session> {
         let (placed, first) = placed.open(host)?;
         let origin = Origin::new(&placed.study, placed.platform())?;
-        let report = RunReport::begin(folder, &placed.study, origin, manner)?;
-        Ok(Session { placed, first, report, standing: Standing::default() })
+        let report = RunReport::begin(folder, &placed.study, origin, options)?;
+        Ok(Session { placed, first, report, progress: RunProgress::default() })
     }
 
     /// Opens the report in `folder` again, at the checkpoint `saved`.
@@ -52,13 +59,13 @@ impl Session {
         placed: PlacedStudy,
         folder: OutputFolder,
         saved: Saved,
-        manner: Manner,
+        options: ReportOptions,
         host: &dyn Host,
     ) -> Result<Session> {
-        let (report, standing) = RunReport::resume(folder, &placed.study, saved, manner)?;
+        let (report, progress) = RunReport::resume(folder, &placed.study, saved, options)?;
         let (members, all) = (report.members(), placed.study.member_count());
         host.say(&format!("resuming: {members} of {all} members are in the table"));
-        Ok(Session { placed, first: FirstBackend::Unopened, report, standing })
+        Ok(Session { placed, first: FirstBackend::Unopened, report, progress })
     }
 
     /// Returns whether the CPU may take over if the GPU fails.
@@ -86,8 +93,8 @@ impl Session {
         let early = [&self.placed.warnings()[..], self.report.moves()].concat();
         early.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
         let (out, falls_back) = (self.folder().to_path_buf(), self.may_fall_back());
-        let Session { placed: PlacedStudy { study, choices, .. }, first, mut report, standing } = self;
-        if let Err(error) = advance(&study, choices, first, standing, &mut report, host) {
+        let Session { placed: PlacedStudy { study, choices, .. }, first, mut report, progress } = self;
+        if let Err(error) = advance(&study, choices, first, progress, &mut report, host) {
             return Err(ended(report, error, falls_back, &out, host));
         }
         let late = report.warnings();
@@ -99,7 +106,7 @@ impl Session {
 
     /// Checks that the checkpoint counts as many members as have rows.
     fn check_rows(&self) -> Result<()> {
-        let (told, rows) = (self.report.before().saturating_add(self.standing.next), self.report.rows());
+        let (told, rows) = (self.report.before().saturating_add(self.progress.next), self.report.rows());
         if told == rows {
             return Ok(());
         }
@@ -127,12 +134,13 @@ fn kept(out: &Path, error: &Error, host: &dyn Host) {
     }
 }
 
-/// Runs one stage after another, from `standing` in the report's current one; `first` is the back end of the study's own.
+/// Runs one stage after another, from `progress` in the report's current one; `first` is the back end of the study's
+/// own.
 fn advance(
     study: &Study,
-    choices: Vec<Choice>,
+    choices: Vec<ChosenBackend>,
     first: FirstBackend,
-    mut standing: Standing,
+    mut progress: RunProgress,
     report: &mut RunReport,
     host: &dyn Host,
 ) -> Result<()> {
@@ -154,10 +162,10 @@ fn advance(
             _ => open(&cells, &choice, host)?.0,
         };
         report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());
-        let standing = std::mem::take(&mut standing);
+        let progress = std::mem::take(&mut progress);
         let mut shown = Shown { report, host };
-        let mut sink = Judged { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
-        simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), standing, &mut sink)?;
+        let mut sink = LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
+        simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), progress, &mut sink)?;
     }
     Ok(())
 }
@@ -187,11 +195,11 @@ impl Sink for Shown<'_> {
         self.report.progress(done, total, share)
     }
 
-    fn wish(&mut self) -> Wish {
-        self.report.wish()
+    fn next_request(&mut self) -> SinkRequest {
+        self.report.next_request()
     }
 
-    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
-        self.report.checkpoint(standing)
+    fn checkpoint(&mut self, progress: &RunProgress) -> Result<()> {
+        self.report.checkpoint(progress)
     }
 }

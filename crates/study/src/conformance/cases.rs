@@ -42,7 +42,7 @@ pub enum Driven {
     Geometric,
     /// That force, with an energy and a mobility that depend on the direction.
     Crystals,
-    /// The force of the polygon and one beside the flow; or the area or the length is kept.
+    /// The force of the polygon and one besides the flow; or the area or the length is kept.
     Forced,
     /// A crystal and a driving force.
     ForcedCrystals,
@@ -115,8 +115,8 @@ fn become_crystal(run: &mut Run<f64>, [energy, diffusivity]: [&str; 2]) {
     }
 }
 
-/// Forces and conserved quantities of the members, each with every law: a constant force, a feedback, the area, the length
-/// and both.
+/// Forces and conserved quantities of the members, each with every law: a constant force, a feedback, the area, the
+/// length and both.
 const FORCINGS: usize = 5;
 
 /// Lets one of them act on a member, which is at its start. What is kept is a little off at the start.

@@ -5,9 +5,10 @@
 //! factors are in one table ([`bounds`]), with the reason for each scale.
 //!
 //! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps, [`adaptive`]
-//! after adaptive ones, [`events`] where members pause at levels. They use an ensemble in which every member has its own curve, flow, τ and ω ([`members`]).
-//! `curvelax check` prints the table; `tests/cases/conformance` asserts it, with a negative control for each comparison. A
-//! run that begins on a GPU compares a few members first ([`self_test`](self_test::self_test)).
+//! after adaptive ones, [`events`] where members pause at levels. They use an ensemble in which every member has its
+//! own curve, flow, τ and ω ([`members`]). `curvelax check` prints the table; `tests/cases/conformance` asserts it,
+//! with a negative control for each comparison. A run that begins on a GPU compares a few members first
+//! ([`self_test`](self_test::self_test)).
 
 pub mod cases;
 pub mod compare;

@@ -27,8 +27,8 @@ const SHORT: f64 = 0.005;
 
 /// Makes two steps with members of `n` nodes, or adaptive ones over the same time, in the paper's form, in the
 /// geometric one or as crystals, and compares the results with those of `method` on the CPU. In f32 a crystal makes one
-/// adaptive step of a given length: the errors of its nodes are next to rounding, and what follows from them is not the same
-/// on both sides. The slots must be free, and are free again afterwards.
+/// adaptive step of a given length: the errors of its nodes are next to rounding, and what follows from them is not the
+/// same on both sides. The slots must be free, and are free again afterwards.
 ///
 /// # Errors
 /// [`Error::Device`] with the quantity, its error and its bound; errors of `backend`.

@@ -513,7 +513,8 @@ mod tests {
         let text = statistics.to_csv(&spec).unwrap();
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
-        // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75 %.
+        // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75
+        // %.
         let later = format!(
             "{}2.0,,0{gap},0,,,0{}0.75{}2.0{}0,,,",
             ",".repeat(10),

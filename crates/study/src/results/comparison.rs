@@ -2,7 +2,7 @@
 //!
 //! Cells whose members are drawn on their own are independent groups, and the log-rank test compares them. Its χ²
 //! distribution is a limit for many events. With few it is wrong: cells of one member each have the same χ² whatever
-//! their times are. So each cell must have [`LEAST_EXPECTED`] expected events, the usual rule for χ².
+//! their times are. So each cell must have [`MIN_EXPECTED`] expected events, the usual rule for χ².
 //!
 //! With common random numbers cells are not independent: member j of every cell has the same draw. Then each cell is
 //! compared with the first, member by member, by the [differences](PairedDifferences) of their times.
@@ -15,7 +15,7 @@ use curvelax_ensemble::Spec;
 use curvelax_statistics::{LogRank, Observation, PairedDifferences, Sample, SignedRank, log_rank};
 
 /// Expected events that each cell needs for the log-rank test.
-pub const LEAST_EXPECTED: f64 = 5.0;
+pub const MIN_EXPECTED: f64 = 5.0;
 /// The log-rank test needs time cubic in the number of cells.
 const MAX_COMPARED: usize = 500;
 
@@ -186,7 +186,8 @@ impl CellComparison {
         CellComparison::by_log_rank(samples, "group", |group| format!("`{}`", names[group]), "use fewer groups")
     }
 
-    /// Compares independent samples; `what` is one of them, `name` its name, and `remedy` helps where they are too small.
+    /// Compares independent samples; `what` is one of them, `name` its name, and `remedy` helps where they are too
+    /// small.
     fn by_log_rank(samples: &[&Sample], what: &str, name: impl Fn(usize) -> String, remedy: &str) -> CellComparison {
         let count = samples.len();
         if count < 2 {
@@ -200,10 +201,10 @@ impl CellComparison {
             return refused(format!("fewer than two {what}s still have members when the first one relaxes"));
         };
         let fewest = test.groups.iter().enumerate().min_by(|a, b| a.1.expected.total_cmp(&b.1.expected));
-        match fewest.filter(|(_, group)| group.expected < LEAST_EXPECTED) {
+        match fewest.filter(|(_, group)| group.expected < MIN_EXPECTED) {
             None => CellComparison::LogRank(test),
             Some((rank, group)) => refused(format!(
-                "{what} {} has {:.1} expected relaxations; the log-rank test needs {LEAST_EXPECTED} in each {what}: \
+                "{what} {} has {:.1} expected relaxations; the log-rank test needs {MIN_EXPECTED} in each {what}: \
                  {remedy}",
                 name(rank),
                 group.expected

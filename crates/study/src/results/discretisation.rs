@@ -69,8 +69,8 @@ impl CellLimits {
         }
         let median = |sample: &Sample| KaplanMeier::new(sample).median();
         let ends = median(&at_low_end).zip(median(&at_high_end)).filter(|_| !judged.is_empty());
-        // Errors of discretisation have one sign for all members: they do not average out. So each end is that of limits
-        // that are all as far on its side as they may be.
+        // Errors of discretisation have one sign for all members: they do not average out. So each end is that of
+        // limits that are all as far on its side as they may be.
         let sampled = |share: f64| {
             let of = |sample: &Sample| interval::of_sample(sample, share);
             let [lower, upper] = [of(&at_low_end)?.lower, of(&at_high_end)?.upper];

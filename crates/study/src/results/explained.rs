@@ -1,22 +1,22 @@
 //! What explains the times: how the relaxation times of the members of a cell depend on their features.
 //!
-//! Times of which the largest is more than 30 times the smallest, as those of outlines of many sizes are, enter by their
-//! logarithms, and with them the positive features that vary as widely. All other numbers enter as they are. A rank
-//! correlation near ±1 with a smaller R² means a dependence that is monotone but not straight. A feature that is constant
-//! among the members, or unknown for one of them, is left out.
+//! Times of which the largest is more than 30 times the smallest, as those of outlines of many sizes are, enter by
+//! their logarithms, and with them the positive features that vary as widely. All other numbers enter as they are. A
+//! rank correlation near ±1 with a smaller R² means a dependence that is monotone but not straight. A feature that is
+//! constant among the members, or unknown for one of them, is left out.
 //!
 //! The first [`CONSIDERED`] members of a cell enter. One that ended before a time has none and cannot: the numbers hold
 //! for the members that reached the time, and the others, mostly the slow ones, are counted beside them. If these are
-//! more than [`MOST_CENSORED`], or those that reached the time fewer than [`LEAST_MEMBERS`], nothing is claimed: the
+//! more than [`MAX_CENSORED`], or those that reached the time fewer than [`MIN_MEMBERS`], nothing is claimed: the
 //! only row of the cell and time is that of the regression, with the counts alone.
 
 use curvelax_ensemble::Feature;
 use curvelax_statistics::{Regression, correlation, spearman};
 
 /// Fewest members with a time of which anything is claimed.
-pub const LEAST_MEMBERS: usize = 20;
+pub const MIN_MEMBERS: usize = 20;
 /// Largest share of members without a time beside which anything is claimed.
-pub const MOST_CENSORED: f64 = 0.1;
+pub const MAX_CENSORED: f64 = 0.1;
 /// Largest over smallest time above which logarithms are taken, as on the axes of pictures.
 const WIDE: f64 = 30.0;
 /// Members of a cell that enter: the first ones. More would only cost memory: the error of a correlation is 0.007.
@@ -153,7 +153,7 @@ fn rows(members: &[FeaturedMember], (time, time_name): (usize, &str), names: &[S
     let known: Vec<&FeaturedMember> = members.iter().filter(|member| member.times[time].is_some()).collect();
     let censored = members.len() - known.len();
     let cell = members.first().map_or(0, |first| first.cell);
-    let claims = known.len() >= LEAST_MEMBERS && censored as f64 <= MOST_CENSORED * members.len() as f64;
+    let claims = known.len() >= MIN_MEMBERS && censored as f64 <= MAX_CENSORED * members.len() as f64;
     let row = |feature: &str| ExplainedRow {
         cell,
         time: time_name.into(),

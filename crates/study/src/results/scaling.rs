@@ -1,9 +1,9 @@
 //! The median time as a power of the swept value, where that value is a scale.
 //!
-//! ln median is fitted as a line in ln value, each cell weighted by its own uncertainty: the width of the interval of ln
-//! median over that of a normal number of deviation 1 with the same coverage, 2·1.96 for 95 %. χ² is the sum of the squared distances in units of these uncertainties. If a power law
-//! holds it is about the number of cells less 2; if it is so large that this has a probability below [`REJECTED`], no
-//! power law holds.
+//! ln median is fitted as a line in ln value, each cell weighted by its own uncertainty: the width of the interval of
+//! ln median over that of a normal number of deviation 1 with the same coverage, 2·1.96 for 95 %. χ² is the sum of the
+//! squared distances in units of these uncertainties. If a power law holds it is about the number of cells less 2; if
+//! it is so large that this has a probability below [`REJECTED`], no power law holds.
 //!
 //! A scale is a quantity that is doubled: the amplitude, the size of a shape, the coefficients of a flow. Numerical
 //! settings such as n or the tolerance are none. There the median tends to a limit, not to 0 or infinity.
@@ -72,7 +72,7 @@ impl Scaling {
     }
 
     /// The cells that are not in the fit in a few words, or nothing.
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         const NAMED: usize = 5;
         let named = self.left_out.iter().take(NAMED).map(|(cell, reason)| format!("cell {cell} ({reason})"));
         let more = self.left_out.len().saturating_sub(NAMED);
@@ -170,7 +170,7 @@ mod tests {
         let law = found.law.unwrap();
         assert!((law.exponent + 0.5).abs() < 1e-12 && law.exponent_error.unwrap() > 1e-3, "{law:?}");
         assert!(!found.is_rejected() && law.goodness.unwrap().p_value > 0.9, "{law:?}");
-        assert_eq!((found.scale.as_str(), found.told().as_str()), ("amplitude", ""));
+        assert_eq!((found.scale.as_str(), found.in_words().as_str()), ("amplitude", ""));
     }
 
     #[test]
@@ -214,11 +214,16 @@ mod tests {
     #[test]
     fn cells_that_drop_out_are_named_with_the_reason() {
         let found = of("amplitude=0,0.1,0.2,0.4", &[1.0, 1.0, 1.1, -1.0], 0.1).unwrap();
-        assert_eq!(found.told(), "cell 0 (its value is not positive), cell 3 (fewer than half of its members relaxed)");
+        assert_eq!(
+            found.in_words(),
+            "cell 0 (its value is not positive), cell 3 (fewer than half of its members relaxed)"
+        );
         assert_eq!(found.law.unwrap().count, 2);
         assert_eq!(found.law.unwrap().goodness, None, "a line through two points always fits");
         let none = of("amplitude=0.1,0.2,0.3,0.4,0.5,0.6,0.7", &[-1.0; 7], 0.1).unwrap();
-        assert!(none.law.is_none() && none.told().ends_with("cell 4 (fewer than half of its members relaxed), 2 more"));
+        assert!(
+            none.law.is_none() && none.in_words().ends_with("cell 4 (fewer than half of its members relaxed), 2 more")
+        );
     }
 
     #[test]

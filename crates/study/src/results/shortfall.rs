@@ -6,7 +6,8 @@ use curvelax_ensemble::Spec;
 
 /// Standard errors of a median of n times in half the 95 % interval, in shares of n: 1.96/2.
 const HALF_WIDTH: f64 = 0.98;
-/// Distance from the median, in shares of the members, of the two quantiles between which times are taken as evenly spread.
+/// Distance from the median, in shares of the members, of the two quantiles between which times are taken as evenly
+/// spread.
 const NEAR: f64 = 0.15;
 
 /// What was asked for, what was reached in the cell that is farthest from it, and why it is not the same.
@@ -31,7 +32,7 @@ impl Shortfall {
     }
 
     /// `0.01 asked for, 0.013 reached: …`.
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         let Shortfall { goal, reached, why } = self;
         format!("{} asked for, {} reached: {why}", number(*goal), rounded_beside(*reached, *goal))
     }
@@ -121,8 +122,8 @@ mod tests {
 
     #[test]
     fn the_reason_is_the_larger_part() {
-        // Ranks 24 and 41 of 64 are 8.5/31.5 of the spread from the median. The 19 steps of 0.2/63 from rank 23 to 42 are
-        // 0.3 of the members, so (0.98·0.2011/(0.9984·0.02))² are needed.
+        // Ranks 24 and 41 of 64 are 8.5/31.5 of the spread from the median. The 19 steps of 0.2/63 from rank 23 to 42
+        // are 0.3 of the members, so (0.98·0.2011/(0.9984·0.02))² are needed.
         let sampling =
             "--accuracy 0.02: 0.027 was reached; sampling alone needs about 98 members in each cell: use more --curves";
         assert_eq!(lacks(0.02, 0.1, 1e-5, None).unwrap().split(" to begin").next(), Some(sampling));
@@ -147,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn without_an_interval_the_reason_is_told() {
+    fn without_an_interval_the_reason_is_given() {
         let spec = Spec { accuracy: Some(0.1), refine: true, ..Spec::default() };
         let told = |times: &[Option<f64>]| {
             let mut tally = Tally::of(&spec, &LevelTimes::default());
@@ -155,7 +156,7 @@ mod tests {
                 let status = if t.is_some() { Status::Relaxed } else { Status::Unfinished };
                 tally.add(&outcome(0, status, *t)).unwrap();
             }
-            Shortfall::of(&spec, &EnsembleStatistics::new(&spec, &mut tally).unwrap()).unwrap().told()
+            Shortfall::of(&spec, &EnsembleStatistics::new(&spec, &mut tally).unwrap()).unwrap().in_words()
         };
         assert!(
             told(&[None; 8]).starts_with("0.1 asked for, no interval reached: 0 of 8 members have a limit, too few")

@@ -1,14 +1,13 @@
 //! Running totals over members, for the overview and `run.json`; the members themselves are not stored.
 
+mod warnings;
+
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use super::treatment::{FinerMembers, MollifiedMembers};
-use curvelax_base::{
-    error::Result,
-    text::{plural, significant},
-};
+use curvelax_base::error::Result;
 use curvelax_ensemble::{
     LevelTimes, Mollified, Outcome, Spec, Status,
     request::{MAX_NAMED, sweep::Sweep},
@@ -225,12 +224,10 @@ impl CellTally {
 
 /// The rank of relaxed members in [`Status::ALL`].
 const RELAXED: usize = 0;
-/// Maximum number of cells that a warning names.
-const NAMED_CELLS: usize = 5;
 
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Aside {
+pub struct TallySupplement {
     mollified: MollifiedMembers,
     drifted: (u64, f64),
     below_rounding: u64,
@@ -238,10 +235,10 @@ pub struct Aside {
     excess: Vec<Vec<Spread>>,
 }
 
-impl Aside {
+impl TallySupplement {
     /// Adds the data of other members.
-    pub fn merge(&mut self, other: &Aside) {
-        let Aside { mollified, drifted, below_rounding, excess } = other;
+    pub fn merge(&mut self, other: &TallySupplement) {
+        let TallySupplement { mollified, drifted, below_rounding, excess } = other;
         self.mollified.merge(mollified);
         self.drifted = (self.drifted.0.saturating_add(drifted.0), self.drifted.1.max(drifted.1));
         self.below_rounding = self.below_rounding.saturating_add(*below_rounding);
@@ -372,15 +369,15 @@ impl Tally {
     }
 
     /// Adds data that are not in a row of the summary.
-    pub fn add_aside(&mut self, mollified: &Mollified, unresolved: bool) {
+    pub fn add_supplement(&mut self, mollified: &Mollified, unresolved: bool) {
         self.mollified.add(mollified);
         self.below_rounding += u64::from(unresolved);
     }
 
     /// Returns the data that are not in rows.
-    pub fn aside(&self) -> Aside {
+    pub fn supplement(&self) -> TallySupplement {
         let Tally { mollified, drifted, below_rounding, .. } = *self;
-        Aside {
+        TallySupplement {
             mollified,
             drifted,
             below_rounding,
@@ -389,8 +386,8 @@ impl Tally {
     }
 
     /// Sets the data that are not in rows, after all rows were added.
-    pub fn set_aside(&mut self, aside: Aside) {
-        let Aside { mollified, drifted, below_rounding, excess } = aside;
+    pub fn set_supplement(&mut self, supplement: TallySupplement) {
+        let TallySupplement { mollified, drifted, below_rounding, excess } = supplement;
         (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
         self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
     }
@@ -409,108 +406,11 @@ impl Tally {
         Ok(rows)
     }
 
-    /// What the user should know about the results, one sentence each.
-    pub fn warnings(&self) -> Vec<String> {
-        let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
-        let members = format!("{} {}", self.members(), plural(self.members(), "member"));
-        let failed = self.failed();
-        if failed > 0 {
-            let stalled = self.counts().any(|(status, count)| status == Status::Stalled && count > 0);
-            // Members that creep are stalled, too, without a sweep.
-            let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
-            let direct = if stalled && swept { "where sweeps stalled, --solver direct helps; " } else { "" };
-            warnings.push(format!(
-                "{failed} of {members} failed (see `status`); {direct}unless the flow itself becomes singular, a smaller \
-                 --tau or --adaptive, or more --points, helps"
-            ));
-        }
-        warnings.extend(self.vanished());
-        warnings.extend(self.late());
-        if self.below_rounding > 0 {
-            warnings.push(format!(
-                "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
-                 determined; use --precision f64, or a larger --relax-to or --relax-at",
-                self.below_rounding
-            ));
-        }
-        let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
-        let open = judged().filter(|limit| limit.is_open()).count();
-        if self.refined && open > 0 {
-            let all = judged().count();
-            warnings.push(format!(
-                "t_limit of {open} of {all} {} is the time at the finest level, and t_error a wide bound: their times do not \
-                 converge in n (see `points`){}",
-                plural(all as u64, "member"),
-                if self.has_outlines { "; fewer nodes are enough with a larger --rounding" } else { "" }
-            ));
-        }
-        if let (coarse @ 1.., most) = self.coarse {
-            warnings.push(format!(
-                "the points of the outline leave the time of {coarse} of {members} open: half of them move it by up to {} % \
-                 (see `t_data_error`); give more points, or --interpolate spline if it is smooth between these",
-                significant(100.0 * most, 2)
-            ));
-        }
-        for (name, at_start) in self.events.iter().zip(&self.at_start).filter(|(_, at_start)| **at_start > 0) {
-            warnings
-                .push(format!("the event {name} holds from the start in {at_start} of {members}: its time is 0 there"));
-        }
-        for (i, name) in self.events.iter().enumerate() {
-            let some = self.cells.iter().filter_map(|cell| cell.events.get(i)).filter(|of| of.reached > 0);
-            let stopped: u64 = some.map(|of| of.stopped).sum();
-            if stopped > 0 {
-                warnings.push(format!(
-                    "{stopped} of {members} were stopped when they relaxed, before the event {name}: the slow ones were \
-                     seen for longer, so it has no statistics; use --stop-when-relaxed=false, and a number as --t-end"
-                ));
-            }
-        }
-        let (drifted, worst) = self.drifted;
-        if drifted > 0 {
-            warnings.push(format!(
-                "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
-                 their times and areas are unreliable; use --pull auto, a smaller --tau or --adaptive, or \
-                 more --points"
-            ));
-        }
-        warnings
-    }
-
-    /// The warning about members that vanished before they relaxed.
-    fn vanished(&self) -> Option<String> {
-        let rank = Status::ALL.iter().position(|status| *status == Status::Vanished)?;
-        let before: u64 = self.cells.iter().map(|cell| cell.others[rank]).sum();
-        let all = self.members();
-        (before > 0).then(|| {
-            format!(
-                "{before} of {all} {} vanished before they relaxed: to t_relax they are censored then, as if they would relax later; \
-                 see t_vanish",
-                plural(all, "member")
-            )
-        })
-    }
-
-    /// The warning about cells in which no member relaxed, because the final time came first.
-    fn late(&self) -> Option<String> {
-        let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
-        let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
-        let longer = if self.stops { "a longer --t-end" } else { "a longer --t-end or --t-end auto" };
-        let remedy = format!("use {longer}, or a larger --relax-to or --relax-at");
-        if late.is_empty() {
-            return None;
-        }
-        if self.cells.len() == 1 {
-            return Some(format!("no member relaxed before its final time; {remedy}"));
-        }
-        let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
-        if late.len() > NAMED_CELLS {
-            named.push(format!("{} more", late.len() - NAMED_CELLS));
-        }
-        let (cells, all) = (late.len(), self.cells.len());
-        Some(format!(
-            "no member relaxed before its final time in {cells} of {all} cells ({}); {remedy}",
-            named.join("; ")
-        ))
+    /// Number of members that relaxed before they vanished.
+    pub fn relaxed_before_vanishing(&self) -> u64 {
+        let vanished = Status::ALL.iter().position(|status| *status == Status::Vanished);
+        let relaxed = |cell: &CellTally| vanished.map_or(0, |rank| cell.counts[rank] - cell.others[rank]);
+        self.cells.iter().map(relaxed).sum()
     }
 
     /// Number of members that ended neither relaxed nor unfinished.
@@ -565,14 +465,15 @@ mod tests {
     fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
         let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
         let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
-        assert_eq!(tally.mollified.told(), None);
-        tally.add_aside(&well, false);
+        assert_eq!(tally.mollified.smoothing(), None);
+        tally.add_supplement(&well, false);
         assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
-        let told = "rounded off in 1 member, in at most 7 rounds, which changed the area by at most 5.0 %";
-        assert_eq!(tally.mollified.told(), Some(format!("{told} and put back")));
-        tally.add_aside(&Mollified { crossed: true, sharp: true, ..well }, false);
-        tally.add_aside(&Mollified { area_change: -0.2, ..well }, false);
-        assert!(tally.mollified.told().is_some_and(|told| told.ends_with("by at most 20 %")));
+        let words = "1 member was smoothed until the nodes resolved its outline, in at most 7 rounds: the area changed \
+                     by at most 5.0 %";
+        assert_eq!(tally.mollified.smoothing(), Some(format!("{words}, which was then restored")));
+        tally.add_supplement(&Mollified { crossed: true, sharp: true, ..well }, false);
+        tally.add_supplement(&Mollified { area_change: -0.2, ..well }, false);
+        assert!(tally.mollified.smoothing().is_some_and(|told| told.ends_with("by at most 20 %")));
         let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
         assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
         let warnings = tally.warnings();

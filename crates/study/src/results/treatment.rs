@@ -31,8 +31,8 @@ pub struct MollifiedMembers {
     /// Members of outlines all of whose points are corners.
     #[serde(default)]
     pub polygons: u64,
-    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area by
-    /// that, before it was put back.
+    /// Members of outlines whose corners were rounded before nodes were placed, and the largest relative change of area
+    /// by that, before it was put back.
     #[serde(default)]
     pub rounded: u64,
     /// See there.
@@ -88,20 +88,24 @@ impl MollifiedMembers {
         let change = significant(100.0 * outline_area_change, 2);
         let round = match rounded {
             0 => String::new(),
-            _ => format!("; corners of {rounded} rounded, which changed the area by at most {change} % and put back"),
+            _ => format!(
+                "; corners of {rounded} were rounded, which changed the area by at most {change} % until it was restored"
+            ),
         };
         (!parts.is_empty()).then(|| format!("{}{round}", parts.join(", ")))
     }
 
-    /// What was done for their nodes, after "were"; `None` if nothing was.
-    pub fn told(&self) -> Option<String> {
+    /// What was done for their nodes, as a sentence without its stop; `None` if nothing was.
+    pub fn smoothing(&self) -> Option<String> {
         let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
         // Of those two kinds some are left with another area.
-        let put_back = if crossed + distorted == 0 { " and put back" } else { "" };
+        let restored = if crossed + distorted == 0 { ", which was then restored" } else { "" };
         (members > 0).then(|| {
             format!(
-                "rounded off in {members} {}, in at most {most_rounds} {}, which changed the area by at most {} %{put_back}",
-                plural(members, "member"),
+                "{members} {} smoothed until the nodes resolved {}, in at most {most_rounds} {}: the area changed by at \
+                 most {} %{restored}",
+                if members == 1 { "member was" } else { "members were" },
+                if members == 1 { "its outline" } else { "their outlines" },
                 plural(most_rounds.into(), "round"),
                 significant(100.0 * largest_area_change, 2)
             )
@@ -155,17 +159,18 @@ impl FinerMembers {
     /// How many needed more nodes, of how many, and up to how many nodes; `None` if none did.
     pub fn counted(&self) -> Option<(String, String)> {
         let FinerMembers { judged, finer, most, .. } = *self;
-        (finer > 0).then(|| (format!("{finer} of {judged}"), format!("at up to n = {most}")))
+        (finer > 0).then(|| (format!("{finer} of {judged}"), format!("up to n = {most}")))
     }
 
-    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for all.
-    pub fn told(&self) -> Option<String> {
+    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for
+    /// all.
+    pub fn in_words(&self) -> Option<String> {
         let FinerMembers { judged, finer, most, bounds } = *self;
         let all = format!("{judged} {}", plural(judged, "member"));
-        let more = (finer > 0).then(|| format!("{finer} of {all} at up to n = {most}"));
+        let more = (finer > 0).then(|| format!("{finer} of {all} needed more nodes, up to n = {most}"));
         let open = (bounds > 0).then(|| match finer {
-            0 => format!("the errors of {bounds} of {all} are bounds"),
-            _ => format!("the errors of {bounds} are bounds"),
+            0 => format!("t_error of {bounds} of {all} is a wide bound"),
+            _ => format!("t_error of {bounds} is a wide bound"),
         });
         (finer + bounds > 0).then(|| more.into_iter().chain(open).collect::<Vec<_>>().join("; "))
     }

@@ -22,7 +22,8 @@ pub struct RunVerdict {
 }
 
 impl RunVerdict {
-    /// The verdict on the run of `provenance`, whose `statistics` are needed if [they are judged](RunVerdict::needs_statistics).
+    /// The verdict on the run of `provenance`, whose `statistics` are needed if [they are
+    /// judged](RunVerdict::needs_statistics).
     pub fn new(provenance: &Provenance, statistics: Option<&EnsembleStatistics>) -> RunVerdict {
         let count = |status: Status| provenance.members_by_status.get(status.name()).copied().unwrap_or(0);
         let failures = Status::ALL.into_iter().filter(|status| status.is_failure());
@@ -40,8 +41,8 @@ impl RunVerdict {
         provenance.spec.accuracy.is_some()
     }
 
-    /// Checks that the run with this `summary.csv` holds what was asked for: some member that did not fail, no member that failed if it
-    /// is `strict`, and the accuracy.
+    /// Checks that the run with this `summary.csv` holds what was asked for: some member that did not fail, no member
+    /// that failed if it is `strict`, and the accuracy.
     ///
     /// # Errors
     /// [`Error::Strict`] with what is missing.

@@ -55,14 +55,15 @@ pub enum StartCurve {
     Lemniscate,
 }
 
-/// The energy of the crystal, a small wave on its Wulff shape that keeps its form, by the factors of cos 2ψ, cos 6ψ, … in the
-/// support function, and the rate at which it decays: an eigenvector of the theory of `docs/internals/method.md#crystals`.
+/// The energy of the crystal, a small wave on its Wulff shape that keeps its form, by the factors of cos 2ψ, cos 6ψ, …
+/// in the support function, and the rate at which it decays: an eigenvector of the theory of
+/// `docs/internals/method.md#crystals`.
 const CRYSTAL: &str = "cos:4,0.03";
 const CRYSTAL_WAVE: [f64; 5] = [1.0, -3.401_574_638e-2, 9.336_140_23e-4, -2.003_020_95e-5, 1.715_918_6e-7];
 const CRYSTAL_SIZE: f64 = 5e-3;
 const CRYSTAL_RATE: f64 = 15.427_810_720;
 
-/// What a flow has beside its own law.
+/// What a flow has besides its own law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Beside {
     /// Nothing.
@@ -183,8 +184,8 @@ impl StartCurve {
                 BaseCurve::from_formula(move |u| radius(TAU * u) * DVec2::from_angle(TAU * u))
             }
             StartCurve::Wulff => {
-                // Steps see the errors of the whole curve, so that a wave that is far smaller is lost in them. The terms that are
-                // neglected are of its square.
+                // Steps see the errors of the whole curve, so that a wave that is far smaller is lost in them. The
+                // terms that are neglected are of its square.
                 let (a, energy) = (StartCurve::amplitude(precision).max(CRYSTAL_SIZE), crystal());
                 BaseCurve::from_formula(move |u| {
                     let psi = TAU * u;

@@ -2,23 +2,23 @@
 //!
 //! # Equations
 //!
-//! In equal arclength a curve of length L is its tangent angle `α + ϑ(α)`, `0 ≤ α < 2π`, with ϑ periodic. Let `ℓ = L/2π`,
-//! `κ = 1 + ϑ'` (which is kℓ), `B = ℓ³ b(κ/ℓ)` and `f = κ(B - κ'')`. In the time τ with `dt = ℓ⁴ dτ` the flow is
+//! In equal arclength a curve of length L is its tangent angle `α + ϑ(α)`, `0 ≤ α < 2π`, with ϑ periodic. Let `ℓ =
+//! L/2π`, `κ = 1 + ϑ'` (which is kℓ), `B = ℓ³ b(κ/ℓ)` and `f = κ(B - κ'')`. In the time τ with `dt = ℓ⁴ dτ` the flow is
 //!
 //! ```text
 //! dϑ/dτ = -ϑ'''' + B' + Vκ,   V' = f - <f>,   d ln ℓ/dτ = -<f>,   dA/dτ = -2πℓ² <B>.
 //! ```
 //!
-//! The stiff part then has constant coefficients, whatever the length does. In t a circle under Willmore flow becomes round
-//! algebraically, in τ exponentially.
+//! The stiff part then has constant coefficients, whatever the length does. In t a circle under Willmore flow becomes
+//! round algebraically, in τ exponentially.
 //!
 //! # Method
 //!
-//! The unknowns are ln ℓ, t, A and the Fourier coefficients of ϑ up to n/3. Products are formed on n nodes, and those of
-//! two factors have no aliases. A step is an exponential Euler step, which solves the stiff part exactly, extrapolated from
-//! 1, 2, … 8 parts to order 8. With the coefficients `ê_m` of `e^{i(α+ϑ)}`, `L² - 4πA = L² Σ (1 - 1/m)|ê_m|²` and
-//! `A = πℓ² Σ |ê_m|²/m`, so that the excess `L²/(4πA) - 1` is a quotient of sums without cancellation. It is the limit
-//! n → ∞ of the scheme's, which is measured from the regular polygon.
+//! The unknowns are ln ℓ, t, A and the Fourier coefficients of ϑ up to n/3. Products are formed on n nodes, and those
+//! of two factors have no aliases. A step is an exponential Euler step, which solves the stiff part exactly,
+//! extrapolated from 1, 2, … 8 parts to order 8. With the coefficients `ê_m` of `e^{i(α+ϑ)}`, `L² - 4πA = L² Σ (1 -
+//! 1/m)|ê_m|²` and `A = πℓ² Σ |ê_m|²/m`, so that the excess `L²/(4πA) - 1` is a quotient of sums without cancellation.
+//! It is the limit n → ∞ of the scheme's, which is measured from the regular polygon.
 //!
 //! Everything is computed twice, with n and 2n nodes and with two tolerances, and n is doubled until both agree. The
 //! difference is the error that is told; the coarse solution has most of it.
@@ -46,11 +46,11 @@ const NEGLIGIBLE: f64 = 1e-8;
 /// Tolerances of the coarse solution and of all finer ones: the error of a step relative to ϑ, ln ℓ and t.
 const TOLERANCES: [f64; 2] = [1e-9, 1e-11];
 /// Smallest root mean square of ϑ that errors are relative to: below it, rounding would be a matter of length of steps.
-const LEAST_BEND: f64 = 0.1;
+const MIN_BEND: f64 = 0.1;
 /// Relative difference of two solutions that agree.
 const AGREED: f64 = 1e-6;
 /// Part of the excess at the start below which the excess is not judged relative to itself, and smallest such start.
-const LEAST_EXCESS: f64 = 1e-3;
+const MIN_EXCESS: f64 = 1e-3;
 /// Least error that is told: rounding.
 const ROUNDING: f64 = 1e-12;
 /// First step, in τ, and bounds on the growth of the next.
@@ -79,8 +79,9 @@ pub struct Truth {
     pub energy: f64,
     /// `L²/(4πA) - 1`.
     pub excess: f64,
-    /// Relative difference from a solution with half the nodes and a wider tolerance: of the time, if that was looked for,
-    /// otherwise the largest of the observables. At least the difference of the area from the integral of its own equation.
+    /// Relative difference from a solution with half the nodes and a wider tolerance: of the time, if that was looked
+    /// for, otherwise the largest of the observables. At least the difference of the area from the integral of its own
+    /// equation.
     pub error: f64,
     /// Nodes at the start.
     pub nodes: usize,
@@ -152,18 +153,18 @@ impl Referee {
             let observables = |of: &Truth| [of.length, of.area, of.energy];
             let pairs = observables(coarse).into_iter().zip(observables(fine));
             let excess =
-                (coarse.excess - fine.excess).abs() / fine.excess.max(LEAST_EXCESS * self.excess.max(LEAST_EXCESS));
+                (coarse.excess - fine.excess).abs() / fine.excess.max(MIN_EXCESS * self.excess.max(MIN_EXCESS));
             pairs.map(|(one, other)| (one / other - 1.0).abs()).fold(excess, f64::max)
         };
         self.agreed(&what, |run| if end > 0.0 { 1.0 - run.form.rest[TIME] / end } else { 0.0 }, difference)
     }
 
-    /// The first time at which the excess is at or below `excess`, of which it is a root. A dip that is over within a step
-    /// is not seen; steps are short beside the time in which a shape changes.
+    /// The first time at which the excess is at or below `excess`, of which it is a root. A dip that is over within a
+    /// step is not seen; steps are short beside the time in which a shape changes.
     ///
     /// # Errors
-    /// [`Error::Request`] for a circle; [`Error::Failed`] if solutions of n and 2n nodes do not agree, or the excess does
-    /// not fall so far.
+    /// [`Error::Request`] for a circle; [`Error::Failed`] if solutions of n and 2n nodes do not agree, or the excess
+    /// does not fall so far.
     pub fn time_of_excess(&self, excess: f64) -> Result<Truth> {
         if self.bend.iter().all(|c| c.length() < ROUND) {
             return Err(refused("it is a circle and has no relaxation time"));
@@ -174,7 +175,8 @@ impl Referee {
         self.agreed(&what, |run| (run.shape().excess / excess).ln(), difference)
     }
 
-    /// Follows the curve until `goal` falls to 0, with ever more nodes until the `difference` of two solutions is small.
+    /// Follows the curve until `goal` falls to 0, with ever more nodes until the `difference` of two solutions is
+    /// small.
     fn agreed(
         &self,
         what: &str,
@@ -209,7 +211,7 @@ impl Referee {
 
     /// Nodes of the first solution: enough for the curve at the start.
     fn nodes(&self) -> usize {
-        let least = NEGLIGIBLE * largest(&self.bend, LEAST_BEND);
+        let least = NEGLIGIBLE * largest(&self.bend, MIN_BEND);
         let last = (0..self.bend.len()).rev().find(|i| weight(&self.bend, *i) > least).unwrap_or(0);
         (3 * (last + 2)).next_power_of_two().clamp(NODES[0], NODES[1] / 2)
     }
@@ -231,7 +233,8 @@ fn refused(problem: &str) -> Error {
     Error::Request(format!("the referee solves for smooth curves that turn round once: {problem}"))
 }
 
-/// The Fourier coefficients of ϑ and ℓ of a curve from `samples` points at equal steps of u; `None` if they are too few.
+/// The Fourier coefficients of ϑ and ℓ of a curve from `samples` points at equal steps of u; `None` if they are too
+/// few.
 ///
 /// The coefficients are integrals over α, which are taken over u: a periodic integrand has no error but aliases.
 fn resolve(point: &impl Fn(f64) -> DVec2, samples: usize) -> Result<Option<(Vec<DVec2>, f64)>> {
@@ -412,7 +415,7 @@ impl SpectralRun {
             if value.abs() < FOUND || middle == low || middle == high {
                 return Ok(());
             }
-            // The Illinois rule: an end that stays counts for less, so that the other does not stay for ever.
+            // The Illinois rule: an end that stays counts for less, so that the other does not stay there.
             if value > 0.0 {
                 (low, above, below) = (middle, value, 0.5 * below);
             } else {
@@ -422,7 +425,8 @@ impl SpectralRun {
         Ok(())
     }
 
-    /// Makes a step from `old`, of which the velocity is known, and returns its error: the difference of orders 8 and 7.
+    /// Makes a step from `old`, of which the velocity is known, and returns its error: the difference of orders 8 and
+    /// 7.
     fn step(&mut self, old: &TangentAngle, length: f64) -> f64 {
         let (mut sum, mut gap) = (old.clone(), TangentAngle::new(old.bend.len()));
         let first = self.velocity.clone();
@@ -452,7 +456,7 @@ impl SpectralRun {
         if !is_finite {
             return f64::INFINITY;
         }
-        let bend = gap.size() / self.form.size().max(LEAST_BEND);
+        let bend = gap.size() / self.form.size().max(MIN_BEND);
         bend.max(gap.rest[SIZE].abs()).max((gap.rest[TIME] / self.form.rest[TIME]).abs())
     }
 

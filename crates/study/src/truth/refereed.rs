@@ -97,8 +97,8 @@ pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
     Ok(Truth { t: truth.t / spec.mobility(), ..truth })
 }
 
-/// The times of the first member of a spec, without a sweep, at rising numbers of nodes, and its limit; steps and levels
-/// of the spec are replaced.
+/// The times of the first member of a spec, without a sweep, at rising numbers of nodes, and its limit; steps and
+/// levels of the spec are replaced.
 ///
 /// # Errors
 /// Those of [`relaxation_truth`], before anything runs, and of the back end.
@@ -140,7 +140,7 @@ fn order(coarse: &RefereeRow, fine: &RefereeRow) -> Option<f64> {
     (ratio > 0.0 && ratio.is_finite()).then(|| ratio.ln() / refined.ln())
 }
 
-/// Limits of all members of a spec, without a sweep; `tell` hears of them in batches.
+/// Limits of all members of a spec, without a sweep; `tell` receives them in batches.
 ///
 /// # Errors
 /// Those of [`Study::new`], of the back end, and of `tell`.

@@ -153,8 +153,8 @@ impl WorkPrecision {
         )
     }
 
-    /// The ways of stepping, each at several resolutions, the coarsest first: steps of one length, then adaptive steps of
-    /// rising order.
+    /// The ways of stepping, each at several resolutions, the coarsest first: steps of one length, then adaptive steps
+    /// of rising order.
     pub fn ways(&self, solver: Solver) -> Vec<Vec<Stepping>> {
         let fixed = STEPS.map(Stepping::Fixed).to_vec();
         let orders = LEAST_ORDER..=most_order(self.precision.epsilon());

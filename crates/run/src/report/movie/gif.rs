@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_member_is_filled_and_told_when_it_has_relaxed() {
+    fn a_member_is_filled_and_named_when_it_has_relaxed() {
         let movie = movie(1, 400);
         let shown = |t: f64| {
             let mut picture = movie.still().unwrap();

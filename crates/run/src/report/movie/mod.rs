@@ -23,7 +23,7 @@ use super::{
 use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
 use curvelax_draw::axis::tick_step;
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, Status};
 use curvelax_files::portraits::Film;
 use moved::MovedMember;
 use pace::MoviePace;
@@ -35,7 +35,7 @@ pub const WIDTHS: [u32; 2] = [160, 1920];
 /// Seconds of motion, unless others are requested.
 pub const SECONDS: f64 = 6.0;
 /// Shortest and longest motion in seconds.
-pub const MOST_SECONDS: [f64; 2] = [0.5, 60.0];
+pub const MAX_SECONDS: [f64; 2] = [0.5, 60.0];
 /// Seconds for which the last state stays.
 pub const HOLD: f64 = 1.0;
 
@@ -64,7 +64,7 @@ const BAR: f64 = 0.22;
 
 /// What is requested of a movie.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Cut {
+pub struct MovieOptions {
     /// Seconds from the first state to the last.
     pub seconds: f64,
     /// Width in pixels.
@@ -106,7 +106,7 @@ struct MoviePanel {
 impl Movie {
     /// The members to watch, the first ones or some of all cells, as `cut` requests it; none if no film has a state
     /// to draw. `t_limit` knows the limit of a member, if it has one.
-    pub fn new(films: &[Film], spec: &Spec, cut: &Cut, t_limit: impl Fn(u64) -> Option<f64>) -> Option<Movie> {
+    pub fn new(films: &[Film], spec: &Spec, cut: &MovieOptions, t_limit: impl Fn(u64) -> Option<f64>) -> Option<Movie> {
         let shown = if spec.sweep.is_empty() { films.len().min(cut.members) } else { films.len() };
         let films: Vec<&Film> = spread(shown, cut.members).map(|i| &films[i]).collect();
         let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
@@ -155,7 +155,7 @@ impl Movie {
             let moved = states.into_iter().map(|nodes| nodes.into_iter().map(pixel).collect());
             let frames = film.times.iter().copied().zip(moved).collect();
             let unit = time_unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
-            let end = match (film.t_relax, t_limit(film.member)) {
+            let end = match (film.t_relax.filter(|_| film.status != Status::Vanished), t_limit(film.member)) {
                 (Some(t), Some(limit)) => (t, film.status.name().to_string() + &in_the_limit(limit, &unit)),
                 (Some(t), None) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
                 (None, _) => (film.times.last().copied().unwrap_or_default(), film.status.name().into()),
@@ -259,14 +259,14 @@ pub(super) mod tests {
     use curvelax_ensemble::Status;
     use curvelax_files::samples::film;
 
-    const CUT: Cut = Cut { seconds: 1.0, width: 800, members: 12 };
+    const CUT: MovieOptions = MovieOptions { seconds: 1.0, width: 800, members: 12 };
 
     /// Members of which some end early.
     pub fn movie(count: u64, width: u32) -> Movie {
         let status = |member| if member % 3 == 1 { Status::Unfinished } else { Status::Relaxed };
         let t_relax = |member| (status(member) == Status::Relaxed).then_some(0.4 + 0.1 * member as f64);
         let films: Vec<Film> = (0..count).map(|member| film(member, 60, status(member), t_relax(member))).collect();
-        Movie::new(&films, &Spec::default(), &Cut { width, ..CUT }, |_| None).unwrap()
+        Movie::new(&films, &Spec::default(), &MovieOptions { width, ..CUT }, |_| None).unwrap()
     }
 
     #[test]
@@ -313,9 +313,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_limit_is_told_in_the_words_of_the_report_and_the_clock_is_raw() {
+    fn a_movie_has_limits_in_the_words_of_the_report_and_the_clock_of_the_run() {
         let films: Vec<Film> = (0..3).map(|member| film(member, 60, Status::Relaxed, Some(0.5))).collect();
-        let cut = |width| Cut { width, ..CUT };
+        let cut = |width| MovieOptions { width, ..CUT };
         let movie =
             |width, limit: fn(u64) -> Option<f64>| Movie::new(&films, &Spec::default(), &cut(width), limit).unwrap();
         let wide = movie(800, |member| (member != 1).then_some(0.51234));
@@ -323,7 +323,7 @@ pub(super) mod tests {
         assert_eq!(ends, ["relaxed, t_limit = 0.5123", "relaxed at t = 0.5", "relaxed, t_limit = 0.5123"]);
         // The moment is that of what moves.
         assert_eq!(wide.panels[0].end.0, 0.5);
-        assert_eq!(wide.head(), "t is raw, at the nodes of the run; grey: start");
+        assert_eq!(wide.head(), "t is that of the run, not the limit; grey: start");
         assert!(wide.svg().contains(&wide.head()));
         assert_eq!(movie(400, |_| Some(0.5)).head(), "grey: start");
         assert_eq!(movie(800, |_| None).head(), "grey: start");
@@ -349,7 +349,7 @@ pub(super) mod tests {
         let mut spec = Spec { curves: 6, ..Spec::default() };
         spec.sweep.set("amplitude=0.05,0.1".parse().unwrap());
         let films: Vec<Film> = (0..12).map(|member| film(member, 60, Status::Relaxed, Some(0.5))).collect();
-        let few = Cut { members: 3, ..CUT };
+        let few = MovieOptions { members: 3, ..CUT };
         let names = |spec: &Spec| {
             let movie = Movie::new(&films, spec, &few, |_| None).unwrap();
             movie.panels.iter().map(|panel| panel.names.join(": ")).collect::<Vec<_>>()

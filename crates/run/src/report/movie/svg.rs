@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_is_told_when_it_is_reached() {
+    fn the_end_is_named_when_it_is_reached() {
         let movie = movie(1, 800);
         let at = share(0.5 * movie.pace.moment(0.4));
         let text = movie.svg();

@@ -23,7 +23,7 @@ use scope::Sheets;
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 /// Its digest, by which the content security policy allows this script only. A test computes it.
-const SCRIPT_DIGEST: &str = "sha256-B/ZEN33YyEKOZo9D6ZjnLHn5zRCP2hIGl5Yx/5KDcVQ=";
+const SCRIPT_DIGEST: &str = "sha256-p2hBubjQGTLFJE1JTm08jX46zORurr4BSUyOICPJ1sg=";
 
 /// Longer tables are truncated, and say so.
 const MAX_ROWS: usize = 200;
@@ -42,6 +42,8 @@ pub struct Page<'a> {
     pub what: &'a str,
     /// Members by status, such as `("relaxed", 412)`.
     pub statuses: Vec<(&'a str, u64)>,
+    /// Of those that vanished, the members that had relaxed.
+    pub relaxed_before: u64,
     /// The numbers to read first: how long relaxation took.
     pub headline: Vec<Headline>,
     /// They are those of members, in a list.
@@ -91,8 +93,10 @@ pub struct PageFigure {
 /// A table.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PageTable {
-    /// What it holds.
+    /// What it holds, in a few words.
     pub caption: String,
+    /// How it is read; may be empty.
+    pub note: String,
     /// Names of the columns.
     pub header: Vec<String>,
     /// Cells as shown. Columns of numbers are aligned at the right.
@@ -152,7 +156,7 @@ impl Page<'_> {
         if let Some(player) = player {
             html += &format!(
                 "<div>\n{}</div>\n",
-                section("Members on their way", "", &(player.html() + &paragraph("note", self.clock)))
+                section("Members over time", "", &(player.html() + &paragraph("note", self.clock)))
             );
         }
         html + "</div>\n"
@@ -194,7 +198,7 @@ impl Page<'_> {
     }
 
     fn counts(&self) -> String {
-        let (relaxed, all) = (self.with("relaxed"), self.all());
+        let (relaxed, all) = (self.with("relaxed") + self.relaxed_before, self.all());
         if all == 0 {
             return paragraph("relaxed-count", "There are no members.");
         }
@@ -220,19 +224,21 @@ impl Page<'_> {
 
     fn wrong(&self) -> String {
         if !self.warnings.is_empty() {
-            let items = self.warnings.iter().map(|warning| format!("<li>{}</li>\n", escape(warning)));
+            let items = self.warnings.iter().map(|warning| format!("<li>{}</li>\n", with_code(warning)));
             return format!("<ul>\n{}</ul>\n", items.collect::<String>());
         }
-        let (unfinished, relaxed) = (self.with("unfinished"), self.with("relaxed"));
-        let bad = self.all() - unfinished - relaxed;
+        let [unfinished, relaxed, vanished] = ["unfinished", "relaxed", "vanished"].map(|status| self.with(status));
+        let (bad, relaxed) = (self.all() - unfinished - relaxed - vanished, relaxed + self.relaxed_before);
         paragraph(
             "",
             &match (bad, unfinished) {
-                (0, 0) if relaxed > 0 => "Nothing: every member relaxed, and there are no warnings.".into(),
+                (0, 0) if relaxed > 0 && relaxed == self.all() => {
+                    "Nothing: every member relaxed, and there are no warnings.".into()
+                }
                 (0, 0) => "Nothing: there are no warnings.".into(),
                 (0, _) => format!(
                     "Nothing: no member failed, and there are no warnings. {} had not relaxed when time was up, and \
-                 count as censored.",
+                     count as censored.",
                     count(unfinished, "member")
                 ),
                 _ => format!("{} failed: see the statuses.", count(bad, "member")),
@@ -270,7 +276,7 @@ impl PageTable {
     /// The same table without columns in which nothing is known, or no member was counted.
     #[must_use]
     pub fn without_empty_columns(self) -> PageTable {
-        let PageTable { caption, header, rows, source } = self;
+        let PageTable { caption, note, header, rows, source } = self;
         let statuses = ["unfinished", "singular", "nonfinite", "stalled", "vanished"];
         let is_kept = |j: usize| {
             let nothing = |text: &str| text.is_empty() || text == "0" && statuses.contains(&&*header[j]);
@@ -280,7 +286,7 @@ impl PageTable {
         let of = |cells: Vec<String>| {
             cells.into_iter().zip(&kept).filter(|(_, kept)| **kept).map(|(text, _)| text).collect()
         };
-        PageTable { caption, rows: rows.into_iter().map(of).collect(), source, header: of(header) }
+        PageTable { caption, note, rows: rows.into_iter().map(of).collect(), source, header: of(header) }
     }
 
     fn html(&self) -> String {
@@ -302,7 +308,8 @@ impl PageTable {
         let caption = escape(&self.caption);
         let mut html = format!(
             "<div class=\"table turned\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
-             <p class=\"title\">{caption}</p>\n<table>\n<tbody>\n"
+             <p class=\"title\">{caption}</p>\n{}<table>\n<tbody>\n",
+            paragraph("small", &self.note)
         );
         for (j, name) in self.header.iter().enumerate() {
             let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
@@ -333,12 +340,12 @@ impl PageTable {
         let caption = escape(&self.caption);
         let columns = self.header.len();
         let cell = |row: &[String], j: usize| escape(row.get(j).map_or("", String::as_str));
-        let is_number = |text: &str| text.is_empty() || text.replace('\u{2212}', "-").parse::<f64>().is_ok();
+        let is_number = |text: &str| text.is_empty() || number(text);
         let numbers: Vec<bool> =
             (0..columns).map(|j| self.rows.iter().all(|row| row.get(j).is_none_or(|text| is_number(text)))).collect();
         let class = |j: usize| if numbers[j] { " class=\"number\"" } else { "" };
 
-        let mut html = begin_table(&caption);
+        let mut html = begin_table(&caption, &paragraph("small", &self.note));
         html += "<thead><tr>";
         for j in 0..columns {
             let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
@@ -360,10 +367,17 @@ impl PageTable {
     }
 }
 
-fn begin_table(caption: &str) -> String {
+/// Whether a cell is a number: plain, with a power of ten, or a bound.
+fn number(text: &str) -> bool {
+    let text = text.trim_start_matches("≥ ").replace('\u{2212}', "-");
+    let mantissa = text.split_once("·10").map_or(&text[..], |(mantissa, _)| mantissa);
+    mantissa.parse::<f64>().is_ok()
+}
+
+fn begin_table(caption: &str, note: &str) -> String {
     format!(
-        "<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n<table>\n\
-         <caption>{caption}</caption>\n"
+        "<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
+         <p class=\"title\">{caption}</p>\n{note}<table>\n"
     )
 }
 
@@ -403,6 +417,23 @@ fn paragraph(class: &str, text: &str) -> String {
         ("", text) => format!("<p>{}</p>\n", escape(text)),
         (class, text) => format!("<p class=\"{class}\">{}</p>\n", escape(text)),
     }
+}
+
+/// A warning with what is typed in it as code, which is not broken into lines: flags, and names between backticks.
+fn with_code(text: &str) -> String {
+    let quoted = text.split('`').enumerate().map(|(i, part)| match i % 2 {
+        1 => format!("<code>{}</code>", escape(part)),
+        _ => {
+            let word = |word: &str| match word.trim_end_matches([',', ';', ':', '.', ')']) {
+                flag if flag.starts_with("--") => {
+                    format!("<code>{}</code>{}", escape(flag), escape(&word[flag.len()..]))
+                }
+                _ => escape(word),
+            };
+            part.split(' ').map(word).collect::<Vec<_>>().join(" ")
+        }
+    });
+    quoted.collect()
 }
 
 /// A percentage; 0 means none and 100 means all.

@@ -1,5 +1,5 @@
 "use strict";
-// Moves the members to the time of the slider: nodes go on straight lines from one recorded time to the next.
+// Moves the members to the time of the slider: nodes move on straight lines from one recorded time to the next.
 (() => {
     const element = (id) => document.getElementById(id);
     const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";

@@ -1,7 +1,7 @@
 //! A few moving members: their nodes at some times, small enough to be part of a page.
 //!
-//! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits of base64. The script
-//! `page.js` reads them and moves the nodes on straight lines from one time to the next.
+//! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits
+//! of base64. The script `page.js` reads them and moves the nodes on straight lines from one time to the next.
 
 use std::{fmt::Write as _, io};
 

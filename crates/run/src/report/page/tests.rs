@@ -36,6 +36,7 @@ fn table(rows: usize) -> PageTable {
         ]
     };
     PageTable {
+        note: String::new(),
         caption: "Relaxation times by cell".into(),
         header: ["amplitude", "members", "relaxed", "median t_relax", "low"].map(String::from).into(),
         rows: (1..=rows).map(|i| row(i).into()).collect(),
@@ -68,6 +69,7 @@ fn page(warnings: &[String]) -> Page<'_> {
     let headline =
         headline.map(|(label, value, note)| Headline { label: label.into(), value: value.into(), note: note.into() });
     Page {
+        relaxed_before: 0,
         clock: "",
         title: "4096 perturbed ellipses under surface diffusion",
         what: "8 amplitudes from 0.01 to 0.2, 512 members each: ellipse:2,1, n = 100, adaptive 0.0001, t-end = 2, seed 1.",
@@ -166,6 +168,7 @@ fn everything_is_escaped() {
     let warnings = [evil.to_owned()];
     let owned = || evil.to_owned();
     let html = Page {
+        relaxed_before: 0,
         clock: "",
         title: evil,
         what: evil,
@@ -178,6 +181,7 @@ fn everything_is_escaped() {
         legend: &[],
         plots: vec![PageFigure { title: owned(), caption: owned(), svg: "<svg></svg>".into() }],
         tables: vec![PageTable {
+            note: String::new(),
             caption: owned(),
             header: vec![owned()],
             rows: vec![vec![owned()]; 300],
@@ -194,7 +198,7 @@ fn everything_is_escaped() {
 
 #[test]
 fn an_empty_page_says_so_and_holds_no_number_that_is_none() {
-    let html = Page { title: "nothing", ..Page::default() }.html();
+    let html = Page { relaxed_before: 0, title: "nothing", ..Page::default() }.html();
     assert!(is_well_formed(&html));
     assert!(html.contains("There are no members.") && html.contains("Nothing: there are no warnings."), "{html}");
     let statuses = vec![("relaxed", 0), ("unfinished", 1)];
@@ -251,6 +255,7 @@ fn the_page_of_a_large_study_stays_small() {
     long.nodes = vec![long.nodes[0].repeat(10); 200];
     let warnings = warnings();
     let html = Page {
+        relaxed_before: 0,
         members: vec![long; 8],
         plots: pictures().iter().map(figure).collect(),
         tables: vec![table(10_000); 10],

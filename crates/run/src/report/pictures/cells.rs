@@ -76,10 +76,11 @@ impl FinishedRun<'_> {
         Some(Crossed { colours, patterns, places })
     }
 
-    /// What distinguishes the cells in a chart; `is_told` if the page has a legend of them.
-    pub(super) fn cell_key(&self, is_told: bool) -> CellKey {
+    /// What distinguishes the cells in a chart; `on_page` if a page may have a legend of them.
+    pub(super) fn cell_key(&self, on_page: bool) -> CellKey {
         let name = self.colour_axis().map_or(self.keys(), |(_, axis)| axis.key.clone());
-        CellKey { name, crossed: self.crossed(), is_told }
+        let names = self.statistics.cells.iter().map(|cell| self.short_label(cell.cell)).collect();
+        CellKey { name, crossed: self.crossed(), names, named_elsewhere: on_page && !self.legend().is_empty() }
     }
 
     /// The legend of the cells for all charts of a page; empty if there is one cell, or a colour bar.

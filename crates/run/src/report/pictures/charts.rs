@@ -28,21 +28,21 @@ use curvelax_study::results::{
 const DISTINCT: usize = SERIES;
 /// Conditions of events in a note.
 const MAX_CONDITIONS: usize = 8;
-/// Maximum quantiles of a cell that are drawn against those of a law.
-const MOST_QUANTILES: usize = 99;
+/// Maximum quantiles of a cell that are drawn against those of a distribution.
+const MAX_QUANTILES: usize = 99;
 /// Maximum panels of a time against features.
 const MAX_PANELS: usize = 8;
 /// Rank of the colour of text among those of series.
 const INK: usize = 4;
 
 impl FinishedRun<'_> {
-    /// The charts of this run, in reading order; if cells are told apart by the legend of a page, without their own. Few
-    /// members that are known by name have their times, and no statistics.
+    /// The charts of this run, in reading order. Few members that are known by name have their times, and no
+    /// statistics.
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
-    pub fn charts(&self, medium: Medium, is_told: bool) -> Result<Vec<Chart>> {
-        let key = &self.cell_key(is_told);
+    pub fn charts(&self, medium: Medium) -> Result<Vec<Chart>> {
+        let key = &self.cell_key(medium == Medium::Page);
         if self.spec().names_members() {
             // A mean over outlines of unlike sizes would mean nothing.
             let excess = if self.spec().members_per_cell() == 1 { self.excess(medium, key)? } else { None };
@@ -75,11 +75,13 @@ impl FinishedRun<'_> {
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
         let (title, quantity) = ("Relaxation times", self.statistics.time());
-        let (note, key, cells) = (&self.what_and_error(), key.clone(), times.collect());
+        let (note, key, cells) = (&self.note(medium, &self.error()), key.clone(), times.collect());
         let svg = RelaxationTimes { title, note, quantity, key, cells, others: &others, median }.draw(medium);
-        let by_cell = if self.statistics.cells.len() > 1 { ", cell by cell" } else { "" };
-        let caption =
-            format!("How many members relaxed when, and which share of all had relaxed by then{by_cell}: {quantity}.");
+        let of_cells = if self.statistics.cells.len() > 1 { " of each cell" } else { "" };
+        let caption = format!(
+            "Above: how many members{of_cells} relaxed at which {quantity}. Below: the share of them that had relaxed by \
+             then."
+        );
         chart(names::RELAXATION, title, &caption, svg)
     }
 
@@ -88,7 +90,7 @@ impl FinishedRun<'_> {
         let numbers = self.numbers();
         let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
             let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
-            let known = self.statistics.times(cell).sample.len().min(MOST_QUANTILES);
+            let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
             let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
             let quantiles = survival.quantiles(shares());
             CellQuantiles {
@@ -99,10 +101,10 @@ impl FinishedRun<'_> {
             }
         });
         let title = "Distribution of the relaxation times";
-        let (note, key, keys, cells) = (&self.what_and_error(), key.clone(), &self.keys(), cells.collect());
+        let (note, key, keys, cells) = (&self.note(medium, &self.error()), key.clone(), &self.keys(), cells.collect());
         let svg = TimeDistribution { title, note, quantity: self.statistics.time(), key, keys, cells }.draw(medium);
-        let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below: quantiles \
-                       against those of a normal law, left, and of a lognormal one, right.";
+        let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below, if known: \
+                       quantiles of the times against a normal distribution, left, and of their logarithms, right.";
         chart(names::DISTRIBUTION, title, caption, svg)
     }
 
@@ -115,7 +117,7 @@ impl FinishedRun<'_> {
         let title = "Members not yet relaxed";
         let survival = Survival {
             title,
-            note: &self.what_and_error(),
+            note: &self.note(medium, &self.error()),
             quantity: self.statistics.time(),
             key: key.clone(),
             curves: curves.collect(),
@@ -139,10 +141,10 @@ impl FinishedRun<'_> {
         let curves: Vec<SurvivalCurve> = groups.iter().map(|group| curve(group)).collect();
         let title = format!("Members not yet relaxed, by {key}");
         let some = match curves.len() < all.len() {
-            true => format!("; {} of {} groups, spread over the order of their medians", curves.len(), all.len()),
+            true => format!("{} of {} groups, spread over the order of their medians", curves.len(), all.len()),
             false => String::new(),
         };
-        let note = &format!("{}{some}", self.what_and_error());
+        let note = &self.note(medium, &joined([self.error(), some]));
         if curves.is_empty() {
             return None;
         }
@@ -167,13 +169,13 @@ impl FinishedRun<'_> {
         let mut curves: Vec<SurvivalCurve> = curves.collect();
         let all = curves.len();
         curves.truncate(DISTINCT);
-        let some = if all > DISTINCT { format!("; the first {DISTINCT} of {all} curves") } else { String::new() };
+        let some = if all > DISTINCT { format!("the first {DISTINCT} of {all} curves") } else { String::new() };
         let shown = spec.event.iter().take(MAX_CONDITIONS).map(Event::to_string);
         let mut conditions = shown.collect::<Vec<_>>().join("; ");
         if spec.event.len() > MAX_CONDITIONS {
             conditions += &format!("; {} more", spec.event.len() - MAX_CONDITIONS);
         }
-        let (title, note) = ("Events", format!("{conditions}; {}{some}", self.what()));
+        let (title, note) = ("Events", self.note(medium, &joined([conditions, some])));
         let (share, none) = ("share without the event", "There are no members, so there are no events.");
         if spec.event.is_empty() {
             return None;
@@ -219,10 +221,10 @@ impl FinishedRun<'_> {
         let theory = theory.into_iter().collect();
         let each = self.spec().members_per_cell() == 1;
         let (title, over) = match each {
-            true => ("Excess", "as long as the member runs"),
-            false => ("Mean excess", "over all members, as long as all of them run"),
+            true => ("Excess", "while the member runs"),
+            false => ("Mean excess", "over all members, while all of them run"),
         };
-        let note = format!("{}; {over}", self.what());
+        let note = self.note(medium, over);
         let band = "5 to 95 % of the members";
         let decay = Decay { title, note: &note, band, key: key.clone(), curves, theory, time: None };
         let excess = match self.spec().sweep.has("energy") {
@@ -248,7 +250,7 @@ impl FinishedRun<'_> {
         let title = "Rates of decay";
         let without = self.tally.members() - rates.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
         let (relative, unit) = (*relative, "length⁻⁴");
-        let (note, key, cells) = (&self.what(), key.clone(), rates);
+        let (note, key, cells) = (&self.note(medium, ""), key.clone(), rates);
         let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw(medium);
         let over = if relative { ", over the rate that linear theory gives the slowest mode" } else { "" };
         let caption = format!(
@@ -293,8 +295,8 @@ impl FinishedRun<'_> {
                 let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
-            let told_apart = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
-            let named = told_apart.map(|(key, value)| format!("{} = {value}", key.key));
+            let distinct = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
+            let named = distinct.map(|(key, value)| format!("{} = {value}", key.key));
             let label = named.collect::<Vec<_>>().join(", ");
             let value = if let [key] = keys[..] { value_of(key, values) } else { None };
             Series { label, value, levels, fit: self.power_law() }
@@ -308,10 +310,10 @@ impl FinishedRun<'_> {
             patterns: series.iter().map(|series| series.label.clone()).collect(),
             places: (0..series.len()).map(|i| (INK, i)).collect(),
         });
-        let other_key = CellKey { name, crossed, is_told: false };
-        let left_out = self.statistics.scaling.as_ref().map(Scaling::told).filter(|told| !told.is_empty());
-        let left_out = left_out.map_or(String::new(), |told| format!(". Not in the fit: {told}"));
-        let note = format!("{}{left_out}", self.what_and_error());
+        let other_key = CellKey { name, crossed, ..CellKey::default() };
+        let left_out = self.statistics.scaling.as_ref().map(Scaling::in_words).filter(|told| !told.is_empty());
+        let left_out = left_out.map_or(String::new(), |told| format!("not in the fit: {told}"));
+        let note = self.note(medium, &joined([self.error(), left_out]));
         let (key, across, time) = (&axis.key[..], None, None);
         let quantity = self.statistics.time();
         let chart_of = Dependence { title: &title, note: &note, quantity, key, other_key, series, across, time };
@@ -362,9 +364,14 @@ impl FinishedRun<'_> {
             let of_cell = |cell: usize| {
                 rows.iter().find(|row| row.cell == cell as u64 && row.time == quantity && row.feature == features[i])
             };
-            let told = if let [cell] = group.cells[..] { of_cell(cell).map(explains) } else { None };
-            let name = (!group.name.is_empty()).then(|| group.name.clone());
-            let heading = name.into_iter().chain(told).collect::<Vec<_>>().join(": ");
+            let heading = match group.cells[..] {
+                [cell] if !group.name.is_empty() => {
+                    let r2 = of_cell(cell).map_or(String::new(), |row| format!(", {}", r2(row)));
+                    self.short_label(cell as u64) + &r2
+                }
+                [cell] => of_cell(cell).map_or(String::new(), explains),
+                _ => group.name.clone(),
+            };
             ScatterPanel { feature: features[i].clone(), heading, points: known.map(point).collect() }
         };
         let shown = (MAX_PANELS / count.max(1)).clamp(1, pictured.len().max(1));
@@ -389,12 +396,15 @@ impl FinishedRun<'_> {
         let told: Vec<bool> = rows.iter().filter(is_told).map(|row| row.r2.is_some()).collect();
         let silent = match told.iter().filter(|told| !**told).count() {
             0 => String::new(),
+            // Only panels of one cell show one.
+            _ if groups.iter().all(|group| group.cells.len() > 1) => String::new(),
             silent => format!("{silent} of {} cells have no R²: too few members relaxed.", told.len()),
         };
-        let notes = vec![self.what(), some, left_out, silent];
+        let notes = vec![self.note(medium, ""), some, left_out, silent];
         let (key, cells, reason) = (key.clone(), cells.collect(), &*reason);
         let svg = Scatter { title, notes, quantity, key, cells, panels, reason }.draw(medium);
-        let caption = format!("The features of members.csv whose straight line explains most of {quantity}.");
+        let caption =
+            format!("{quantity} against the features in members.csv that explain most of it by a straight line.");
         chart(names::FEATURES, title, &caption, svg)
     }
 
@@ -407,11 +417,12 @@ impl FinishedRun<'_> {
         };
         let members: Vec<MemberDot> = self.tally.named.iter().map(dot).collect();
         let has = |of: &dyn Fn(&MemberDot) -> bool| members.iter().any(of);
-        let bar = if has(&|member| member.error.is_some()) { " Bar: its 95 % interval." } else { "" };
+        let bar =
+            if has(&|member| member.error.is_some()) { " Bar: its 95 % interval, which the dot may hide." } else { "" };
         let open = if has(&|member| !member.happened) { " Hollow: the member ended before." } else { "" };
         let (title, quantity) = ("Relaxation times", self.statistics.time());
         let caption = format!("Dot: {quantity} of a member.{bar}{open}");
-        let svg = MemberTimes { title, note: &self.what(), quantity, names: "", members }.draw(medium);
+        let svg = MemberTimes { title, note: &self.note(medium, ""), quantity, names: "", members }.draw(medium);
         chart(names::MEMBER_TIMES, title, &caption, svg)
     }
 
@@ -419,7 +430,7 @@ impl FinishedRun<'_> {
         let title = "Mesh quality at the end";
         let quality = MeshQuality {
             title,
-            note: &self.what(),
+            note: &self.note(medium, ""),
             mesh_ratio: &self.tally.mesh_ratios,
             metric_drift: &self.tally.metric_drifts,
             distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
@@ -431,6 +442,11 @@ impl FinishedRun<'_> {
 
 fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
     Chart { name, figure: figure(title, caption, svg) }
+}
+
+/// The parts that are not empty, as one sentence.
+fn joined(parts: [String; 2]) -> String {
+    parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
 /// What a survival curve is, as far as it is drawn; a stroke is a member that ended before `what`.
@@ -445,8 +461,11 @@ fn survival_caption(drawn: &Survival, what: &str) -> String {
 
 /// How much a feature explains in a cell.
 fn explains(row: &ExplainedRow) -> String {
-    let shown = |value: Option<f64>| value.map_or("not known".into(), |value| significant(value, 3));
-    format!("R² {}, Spearman {}", shown(row.r2), shown(row.spearman))
+    format!("{}, Spearman {}", r2(row), row.spearman.map_or("not known".into(), |value| significant(value, 3)))
+}
+
+fn r2(row: &ExplainedRow) -> String {
+    format!("R² {}", row.r2.map_or("not known".into(), |value| significant(value, 3)))
 }
 
 /// Times at which an event happened in members, or at which they ended without it.

@@ -9,6 +9,7 @@ use curvelax_base::{
     error::shortened,
     text::{count, p_value, significant},
 };
+use curvelax_draw::medium::Medium;
 use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
 use curvelax_statistics::Interval;
 use curvelax_study::results::{
@@ -25,16 +26,17 @@ const MAX_TITLE: usize = 90;
 impl FinishedRun<'_> {
     /// What the page says first.
     pub fn head(&self) -> PageHead {
-        let corners = self.tally.mollified.told().map_or(String::new(), |told| format!(" Corners were {told}."));
+        let smoothing = self.tally.mollified.smoothing().map_or(String::new(), |text| format!(" {text}."));
         PageHead {
             title: self.title(),
             what: format!(
-                "{}, {}.{corners} {}",
+                "{}, {}.{smoothing} {}",
                 count(self.tally.members(), "member"),
                 self.what(),
                 self.about_times()
             ),
             statuses: self.tally.counts().map(|(status, count)| (status.name(), count)).collect(),
+            relaxed_before: self.tally.relaxed_before_vanishing(),
             headline: self.headline(),
         }
     }
@@ -44,10 +46,14 @@ impl FinishedRun<'_> {
         let unit = match (&self.spec().units, self.spec().mobility) {
             (Some(units), _) => format!("in {}", units.shown().time),
             (None, Some(_)) => "in the unit of time of B".into(),
-            (None, None) => "in length⁴, the length being that of the coordinates".into(),
+            (None, None) => "in length⁴, in the unit of length of the coordinates".into(),
         };
         match self.statistics.of_limits {
-            true => format!("Times are limits for many nodes and short steps, {unit}; t_relax is raw."),
+            true => format!(
+                "t_limit is the limit of t_relax for many nodes and short steps; t_relax itself is that of this run, at \
+                 n = {}. Times are {unit}.",
+                self.spec().points
+            ),
             false => format!("Times are {unit}."),
         }
     }
@@ -72,8 +78,12 @@ impl FinishedRun<'_> {
         };
         let flow = if sweep.has("flow") { String::new() } else { format!(" under {flow}") };
         let keys = self.keys();
-        let keys = if keys.is_empty() { keys } else { format!(", by {keys}") };
-        format!("{shape}{flow}{keys}")
+        let keys = if keys.is_empty() { keys } else { format!(", by {}", listed(&keys)) };
+        let Spec { conserve, drive, .. } = self.spec();
+        let kept = conserve.filter(|_| !sweep.has("conserve")).map(|what| format!("{what} kept"));
+        let drive = drive.as_ref().filter(|_| !sweep.has("drive")).map(|drive| format!("drive {drive}"));
+        let acting: String = kept.into_iter().chain(drive).map(|what| format!(", {what}")).collect();
+        format!("{shape}{flow}{acting}{keys}")
     }
 
     /// The labels of the outlines, as many as a title takes.
@@ -91,28 +101,34 @@ impl FinishedRun<'_> {
         }
     }
 
-    pub(super) fn what(&self) -> String {
+    fn what(&self) -> String {
         let swept = self.spec().sweep.axes().iter().map(SweepAxis::title);
         [describe(self.spec())].into_iter().chain(swept).collect::<Vec<_>>().join("; ")
     }
 
-    /// The same, with the error of discretisation of the times in the picture.
-    pub(super) fn what_and_error(&self) -> String {
+    /// What ran and something else below the title of a chart; a page says the first itself.
+    pub(super) fn note(&self, medium: Medium, rest: &str) -> String {
+        let what = if medium == Medium::Page { String::new() } else { self.what() };
+        [&what, rest].into_iter().filter(|text| !text.is_empty()).collect::<Vec<_>>().join("; ")
+    }
+
+    /// The error of discretisation of the times in a picture.
+    pub(super) fn error(&self) -> String {
         // Limits are free of it.
         if self.statistics.of_limits {
-            return self.what();
+            return String::new();
         }
         let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
         let percent: Vec<f64> = errors.filter(|error| error.converges()).map(|error| 100.0 * error.mean).collect();
         let [low, high] = [f64::min, f64::max].map(|of| percent.iter().copied().reduce(of).unwrap_or_default());
         let [low, high] = [low, high].map(|value| significant(value, 2));
         let range = match percent[..] {
-            [] => return self.what(),
+            [] => return String::new(),
             [_] => low,
             _ if low == high => low,
             _ => format!("{low} to {high}"),
         };
-        format!("{}; discretisation about {range} %", self.what())
+        format!("discretisation error about {range} %")
     }
 
     fn headline(&self) -> Vec<Headline> {
@@ -134,7 +150,10 @@ impl FinishedRun<'_> {
                     }
                     _ => "not reached".into(),
                 };
-                let note = format!("over {} cells", cells.len());
+                let note = match (medians.len(), cells.len()) {
+                    (known, all) if known < all => format!("over {known} of {all} cells; the others have no median"),
+                    (_, all) => format!("over {all} cells"),
+                };
                 headline.push(Headline { label: format!("median {}", self.statistics.time()), value: shown, note });
                 headline.extend(scaling.as_ref().and_then(power));
                 headline.extend(compared(comparison));
@@ -158,9 +177,12 @@ impl FinishedRun<'_> {
         let (time, times, unit) = (self.statistics.time(), self.statistics.times(cell), self.time_unit());
         let shown =
             |value: Option<f64>| value.map_or("not reached".into(), |t| format!("{}{unit}", significant(t, DIGITS)));
+        if times.sample.events() == 0 {
+            return vec![Headline { label: time.into(), value: "not reached".into(), note: "by any member".into() }];
+        }
         let tile =
             |label: &str, value: Option<f64>, note: String| Headline { label: label.into(), value: shown(value), note };
-        let told = |interval: Interval| interval.told_shortly(|end| significant(end, DIGITS));
+        let told = |interval: Interval| interval.in_short(|end| significant(end, DIGITS)) + &unit;
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
             Some(_) => "a lower bound: some members had not relaxed at the end".into(),
@@ -175,6 +197,11 @@ impl FinishedRun<'_> {
             headline.push(Headline { label: "nine in ten".into(), value, note: format!("{time}, 5 to 95 %") });
         }
         headline.extend(if self.statistics.of_limits { self.behind(cell) } else { discretisation(cell) });
+        let vanished = Some(&cell.vanishing).filter(|of| of.stopped == 0 && of.times.sample.events() > 0);
+        headline.extend(
+            vanished
+                .map(|of| tile("median t_vanish", of.times.median(), of.times.interval().map_or(String::new(), told))),
+        );
         headline
     }
 
@@ -185,7 +212,7 @@ impl FinishedRun<'_> {
             label: "median t_error".into(),
             value: format!("{}{unit}", significant(error, 2)),
             note: match open {
-                0 => "of each t_limit, 95 %".into(),
+                0 => "half-width of the 95 % interval of each t_limit".into(),
                 _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
             },
         });
@@ -198,6 +225,11 @@ impl FinishedRun<'_> {
     }
 }
 
+/// Keys as a sentence has them.
+fn listed(keys: &str) -> String {
+    keys.rsplit_once(", ").map_or(keys.into(), |(first, last)| format!("{first} and {last}"))
+}
+
 /// The error of discretisation of times without limits.
 fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
     let Some(discretisation) = &cell.discretisation else { return Vec::new() };
@@ -205,10 +237,10 @@ fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
     let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
     let known = count(*members as u64, "member");
     let (value, note) = match discretisation.converges() {
-        true => (format!("{mean} %"), format!("of t_relax, ± {error} %, by {known}")),
+        true => (format!("{mean} %"), format!("± {error} % of t_relax, estimated from {known}")),
         false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
     };
-    vec![Headline { label: "discretisation".into(), value, note }]
+    vec![Headline { label: "discretisation error".into(), value, note }]
 }
 
 /// The power law of the medians, in the headline.

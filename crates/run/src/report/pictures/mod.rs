@@ -13,8 +13,8 @@ use super::{
 use glam::DVec2;
 
 use curvelax_base::{error::Result, text::significant};
-use curvelax_draw::{chart, medium::Medium, width::told_apart};
-use curvelax_ensemble::{Spec, outcome::wulff_outline};
+use curvelax_draw::{medium::Medium, width::distinct};
+use curvelax_ensemble::{Spec, Status, outcome::wulff_outline};
 use curvelax_files::{names, portraits::Film};
 use curvelax_flow::equilibrium::Equilibrium;
 use curvelax_study::results::{
@@ -53,6 +53,8 @@ pub struct PageHead {
     pub what: String,
     /// Members by status.
     pub statuses: Vec<(&'static str, u64)>,
+    /// Of those that vanished, the members that had relaxed.
+    pub relaxed_before: u64,
     /// The numbers to read first.
     pub headline: Vec<Headline>,
 }
@@ -73,7 +75,7 @@ impl FinishedRun<'_> {
     pub fn on_paper(&self, width: f64) -> Result<Vec<Chart>> {
         let medium = Medium::Paper(width);
         let gallery = self.gallery(medium).map(|svg| Chart { name: names::CURVES, figure: first_members(svg) });
-        let mut all: Vec<Chart> = self.charts(medium, false)?.into_iter().chain(gallery).collect();
+        let mut all: Vec<Chart> = self.charts(medium)?.into_iter().chain(gallery).collect();
         all.iter_mut().for_each(|chart| chart.figure.svg = self.with_unit(std::mem::take(&mut chart.figure.svg)));
         Ok(all)
     }
@@ -85,13 +87,9 @@ impl FinishedRun<'_> {
 
     /// The files that are drawn: name and text.
     pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
-        let charts = self.charts(Medium::Screen, false)?;
-        let legend = self.legend();
-        // A page has one legend for all charts, a file its own.
-        let on_page = if legend.is_empty() { None } else { Some(self.charts(Medium::Screen, true)?) };
+        let page = self.page(&self.charts(Medium::Page)?)?;
         let gallery = self.gallery(Medium::Screen);
-        let page = self.page(on_page.as_ref().unwrap_or(&charts), &legend, gallery.as_deref())?;
-        let charts = charts.into_iter().map(|chart| (chart.name, chart.figure.svg));
+        let charts = self.charts(Medium::Screen)?.into_iter().map(|chart| (chart.name, chart.figure.svg));
         let gallery = gallery.map(|svg| (names::CURVES, svg));
         let all = charts.chain(gallery).chain([(names::REPORT, page)]);
         Ok(all.map(|(name, text)| (name, self.with_unit(text))).collect())
@@ -110,23 +108,24 @@ impl FinishedRun<'_> {
         &self.provenance.spec
     }
 
-    /// The text of `report.html`; `gallery` is the picture of the first members.
-    fn page(&self, charts: &[Chart], legend: &[chart::Entry], gallery: Option<&str>) -> Result<String> {
+    /// The text of `report.html`.
+    fn page(&self, charts: &[Chart]) -> Result<String> {
         // Equal results give equal bytes, on any number of threads.
         let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
-        let first = gallery.map(|svg| first_members(svg.into()));
-        let PageHead { title, what, statuses, headline } = self.head();
+        let first = self.gallery(Medium::Page).map(first_members);
+        let PageHead { title, what, statuses, relaxed_before, headline } = self.head();
         let page = Page {
             title: &title,
             what: &what,
             statuses,
+            relaxed_before,
             is_list: self.spec().names_members(),
             headline,
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             clock: if self.statistics.of_limits { RAW_CLOCK } else { "" },
             units: [self.length_unit(), self.time_unit()],
-            legend,
+            legend: &self.legend(),
             plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
             tables: self.tables(),
             spec: &spec,
@@ -135,12 +134,15 @@ impl FinishedRun<'_> {
         Ok(page.html())
     }
 
-    /// When a member relaxed, behind its status: in the limit, if that is known.
-    fn relaxed_at(&self, film: &Film) -> String {
-        let unit = self.time_unit();
-        let raw = film.t_relax.map(|t| format!(" at t = {}{unit}", significant(t, 3)));
-        let limit = self.tally.named(film.member).and_then(|member| member.t_limit);
-        limit.map(|t| in_the_limit(t, &unit)).or(raw).unwrap_or_default()
+    /// How and when a member ended; when it relaxed is said in the limit, if that is known.
+    fn end_of(&self, film: &Film) -> String {
+        let (unit, member) = (self.time_unit(), self.tally.named(film.member));
+        let at = |t: f64| format!(" at t = {}{unit}", significant(t, 3));
+        let when = match film.status {
+            Status::Vanished => member.and_then(|member| member.t_vanish).map(at),
+            _ => member.and_then(|member| member.t_limit).map(|t| in_the_limit(t, &unit)).or(film.t_relax.map(at)),
+        };
+        format!("{}{}", film.status.name(), when.unwrap_or_default())
     }
 
     /// What is written below the portraits.
@@ -148,9 +150,8 @@ impl FinishedRun<'_> {
         let cell = |film: &Film| self.short_label(film.member / self.spec().members_per_cell());
         let cells: Vec<String> = self.films.iter().map(cell).collect();
         let (_, side) = gallery::columns(medium, self.films.len().min(gallery::MAX_PANELS));
-        let cells = told_apart(&cells, gallery::SIZE, side);
-        let end = |film: &Film| format!("{}{}", film.status.name(), self.relaxed_at(film));
-        let ends = self.films.iter().map(end);
+        let cells = distinct(&cells, gallery::SIZE, side);
+        let ends = self.films.iter().map(|film| self.end_of(film));
         let rests = self.films.iter().map(|film| self.at_rest(film).unwrap_or_default());
         Wording { unit: self.length_unit(), cells, ends: ends.collect(), rests: rests.collect() }
     }
@@ -171,7 +172,7 @@ impl FinishedRun<'_> {
             let cell = self.short_label(film.member / self.spec().members_per_cell());
             let cell = if cell.is_empty() { cell } else { format!(" ({cell})") };
             let (name, status) = (film.name(MAX_NAME), film.status.name());
-            let label = format!("{name}{cell}: {status}{}", self.relaxed_at(film));
+            let label = format!("{name}{cell}: {}", self.end_of(film));
             MovingMember { label, status, times: film.times.clone(), nodes: film.frames() }
         };
         let shown = if sweep.is_empty() { self.films.len() } else { MAX_MEMBERS };
@@ -202,8 +203,8 @@ impl FinishedRun<'_> {
 
 /// The gallery with its words.
 fn first_members(svg: String) -> PageFigure {
-    let caption = "Grey: the start. Light: on the way. Colour: the last state, by status.";
-    figure("The first members before, on their way and after", caption, svg)
+    let caption = "Grey: the start. Light: in between. Colour: the last state, by status.";
+    figure("The first members before, during and after", caption, svg)
 }
 
 fn figure(title: &str, caption: &str, svg: String) -> PageFigure {

@@ -8,7 +8,7 @@ use curvelax_files::names;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
     comparison::CellDifference,
-    explained::{ExplainedRow, LEAST_MEMBERS, MOST_CENSORED, TOGETHER},
+    explained::{ExplainedRow, MAX_CENSORED, MIN_MEMBERS, TOGETHER},
     tally::MemberTime,
     times::{QUANTILES, TimeStatistics},
 };
@@ -47,9 +47,11 @@ impl FinishedRun<'_> {
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
         };
-        let raw = if self.statistics.of_limits { "; t_relax is raw, at the nodes of the run" } else { "" };
+        let of_run = format!("; t_relax is that of this run, at n = {}", self.spec().points);
+        let raw = if self.statistics.of_limits { &of_run } else { "" };
         PageTable {
             caption: format!("Each member{raw}"),
+            note: String::new(),
             header: header.collect(),
             rows: self.tally.named.iter().map(row).collect(),
             source: names::SUMMARY.into(),
@@ -126,6 +128,7 @@ impl FinishedRun<'_> {
             header: header.map(String::from).collect(),
             rows: rows.collect(),
             source: names::EVENT_STATISTICS.into(),
+            note: String::new(),
         })
     }
 
@@ -153,6 +156,7 @@ impl FinishedRun<'_> {
             header: header.into_iter().chain(left_out).map(String::from).collect(),
             rows: cells.iter().map(row).collect(),
             source: String::new(),
+            note: String::new(),
         })
     }
 
@@ -187,11 +191,11 @@ impl FinishedRun<'_> {
         let keys = self.keys();
         let first = if keys.is_empty() { "cell" } else { &keys };
         let header = [first, "time", "feature", "members", "censored", "Spearman", "R²", "chosen"];
-        (!rows.is_empty()).then(|| PageTable {
-            caption: format!(
-                "What explains the times: the {LISTED} best features of each alone (R² of a straight line), and a \
-                 linear regression on the chosen ones (R² cross-validated), over the members that reached the time; nothing \
-                 {}{}",
+        rows.iter().any(|row| row.r2.is_some()).then(|| PageTable {
+            caption: "What explains the times".into(),
+            note: format!(
+                "The {LISTED} best features of each time, alone (R² of a straight line), and a linear regression on the \
+                 chosen ones (R² cross-validated), over the members that reached the time. Nothing is said {}{}.",
                 claims(),
                 self.left_out()
             ),
@@ -241,12 +245,13 @@ impl FinishedRun<'_> {
             header: header.collect(),
             rows: rows.map(row).collect(),
             source: source.into(),
+            note: String::new(),
         }
     }
 }
 
 /// When nothing is said about a time.
 pub(super) fn claims() -> String {
-    let percent = 100.0 * MOST_CENSORED;
-    format!("if fewer than {LEAST_MEMBERS} members reached it, or more than {percent} % did not")
+    let percent = 100.0 * MAX_CENSORED;
+    format!("if fewer than {MIN_MEMBERS} members reached it, or more than {percent} % did not")
 }

@@ -61,8 +61,8 @@ pub fn adaptive<T: Evolves>(
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
 }
 
-/// Compares members driven so after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`. Those on the
-/// GPU are changed, if a change is given; the comparison must then fail.
+/// Compares members driven so after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`.
+/// Those on the GPU are changed, if a change is given; the comparison must then fail.
 pub fn driven<T: Evolves>(
     driven: Driven,
     adapter: &gpu::Gpu,
@@ -146,8 +146,8 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
 }
 
 /// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns
-/// the difference. An event where two adaptive steps meet may be in either: the [times](PACE) of events are compared, too,
-/// if there are both.
+/// the difference. An event where two adaptive steps meet may be in either: the [times](PACE) of events are compared,
+/// too, if there are both.
 fn same_events(ours: &Left, theirs: &Left, adaptive: bool) -> Result<(), String> {
     let (a, b) = (&ours.counters, &theirs.counters);
     let timed = adaptive && ![a, b].into_iter().any(|c| c.half_step == NEVER || c.relax_step == NEVER);

@@ -45,8 +45,8 @@ pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> 
     Ok(Twin { left, longest, steepest, order, leverage })
 }
 
-/// The leverage of the error of a step of this order after which the next one is `growth` times as long: that length goes
-/// with the error to the power -1/order, and does not depend on it at the largest growth.
+/// The leverage of the error of a step of this order after which the next one is `growth` times as long: that length
+/// goes with the error to the power -1/order, and does not depend on it at the largest growth.
 fn leverage_of(growth: f64, order: u32) -> f64 {
     if growth >= pace::MAX_GROWTH {
         1.0

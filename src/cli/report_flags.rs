@@ -1,4 +1,4 @@
-//! How a run goes about its work, for `run` and `resume`: flags that change no result.
+//! Flags of `run` and `resume` that affect how a run reports and stops, not its results.
 
 use std::{
     path::Path,
@@ -12,7 +12,7 @@ use crate::{
         names,
         reader::{self, Finished},
     },
-    report::{Form, Manner, Progress, Stop, complete::listed, document::Document},
+    report::{Progress, ReportOptions, ResultFormat, Stop, complete::listed, document::Document},
     results::{EnsembleStatistics, RunVerdict},
     session::{Completed, Host},
 };
@@ -20,9 +20,9 @@ use crate::{
 /// A run that is asked to stop has this time to reach a point where all its work is saved.
 const PATIENCE: Duration = Duration::from_millis(2500);
 
-/// How a run goes about its work: nothing of it changes a result.
+/// Options that affect how a run reports and stops, not its results.
 #[derive(clap::Args)]
-pub struct MannerFlags {
+pub struct ReportFlags {
     /// Print no progress, notes or table: only errors, and the results if --json is given
     #[arg(long, help_heading = flags::OUTPUT)]
     pub quiet: bool,
@@ -43,7 +43,7 @@ pub struct MannerFlags {
     checkpoint_every: Duration,
 }
 
-impl MannerFlags {
+impl ReportFlags {
     /// Checks that the results in `out` can be printed as requested.
     ///
     /// # Errors
@@ -63,7 +63,7 @@ impl MannerFlags {
         }
     }
 
-    /// Says about the finished run in `out` what was said at its end: its results as JSON, if they are asked for, and
+    /// Reports on the finished run in `out` as at its end: its results as JSON, if requested, and
     /// whether it holds what was asked for.
     fn finished(&self, out: &Path) -> Result<()> {
         let provenance = reader::provenance(out)?;
@@ -96,7 +96,7 @@ impl MannerFlags {
     }
 }
 
-impl Host for MannerFlags {
+impl Host for ReportFlags {
     /// Prints the line on stderr, unless quiet.
     fn say(&self, line: &str) {
         if !self.quiet {
@@ -104,23 +104,23 @@ impl Host for MannerFlags {
         }
     }
 
-    fn form(&self) -> Form {
-        if self.json { Form::Json } else { Form::Overview }
+    fn form(&self) -> ResultFormat {
+        if self.json { ResultFormat::Json } else { ResultFormat::Overview }
     }
 
-    fn manner(&self) -> Result<Manner> {
+    fn options(&self) -> Result<ReportOptions> {
         let stop = Stop::default();
         signals::watch(&stop, self.max_time)?;
-        Ok(self.manner_with(stop))
+        Ok(self.options_with(stop))
     }
 
-    fn manner_with(&self, stop: Stop) -> Manner {
+    fn options_with(&self, stop: Stop) -> ReportOptions {
         let (since, progress, every) = (Instant::now(), Progress::new(self.quiet), self.checkpoint_every);
-        Manner { since, progress, every, stop, patience: PATIENCE }
+        ReportOptions { since, progress, every, stop, patience: PATIENCE }
     }
 }
 
-/// Does the same as [`MannerFlags::check_name`], if `json` is set.
+/// Does the same as [`ReportFlags::check_name`], if `json` is set.
 pub fn check_name(json: bool, out: &Path) -> Result<()> {
     match json && out.to_str().is_none() {
         true => Err(Error::value(

@@ -1,14 +1,14 @@
 //! Between a run and its sink: members of a level become rows, and those of the study get what the levels tell of them.
 
 use crate::{
-    Cell, Ended, Extent, LevelRow, LevelTimes, Outcome, SeriesRow, Sink, Snapshot, Spec, Standing, Wish,
+    Cell, Ended, Extent, LevelRow, LevelTimes, Outcome, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Spec,
     outcome::levels::RefinementLevel,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::number::Precision;
 
 /// Hands the members of a level to a sink as rows, and those of the study with what the levels tell of them.
-pub struct Judged<'a> {
+pub struct LevelSink<'a> {
     /// The level that runs, if it is not the study itself.
     pub level: Option<RefinementLevel>,
     /// The numbers in which it computes.
@@ -21,7 +21,7 @@ pub struct Judged<'a> {
     pub sink: &'a mut dyn Sink,
 }
 
-impl Judged<'_> {
+impl LevelSink<'_> {
     fn cell(&self, ended: &Outcome) -> Result<&Spec> {
         let at = self.cells.binary_search_by_key(&ended.cell, |cell| cell.index);
         let none = |_| Error::Failed(format!("member {} is of no cell that runs", ended.member));
@@ -29,7 +29,7 @@ impl Judged<'_> {
     }
 }
 
-impl Sink for Judged<'_> {
+impl Sink for LevelSink<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         match self.level {
             Some(level) => {
@@ -54,11 +54,11 @@ impl Sink for Judged<'_> {
         self.sink.progress(done, total, share)
     }
 
-    fn wish(&mut self) -> Wish {
-        self.sink.wish()
+    fn next_request(&mut self) -> SinkRequest {
+        self.sink.next_request()
     }
 
-    fn checkpoint(&mut self, standing: &Standing) -> Result<()> {
-        self.sink.checkpoint(standing)
+    fn checkpoint(&mut self, progress: &RunProgress) -> Result<()> {
+        self.sink.checkpoint(progress)
     }
 }

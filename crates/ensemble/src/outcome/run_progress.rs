@@ -12,7 +12,7 @@ use curvelax_flow::scheme::member::{Counters, Report};
 ///
 /// Members of rank below `next` have been handed over. A member listed nowhere is at its start.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Standing {
+pub struct RunProgress {
     /// The first member that has not been handed to the sink.
     pub next: u64,
     /// Members that ended before one of lower rank.
