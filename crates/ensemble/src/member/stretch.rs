@@ -89,7 +89,10 @@ impl Sizes {
         let (own_area, own_length) = (polygon::signed_area(nodes), polygon::length(nodes));
         let scale = match conserved {
             Conserved::Length => length / own_length,
-            _ if own_area > polygon::NO_AREA * own_length * own_length => (area / own_area).sqrt(),
+            // The loops of an eight cancel, whatever is left of their area.
+            _ if own_area > polygon::NO_AREA * own_length * own_length && polygon::turning_number(nodes) != 0 => {
+                (area / own_area).sqrt()
+            }
             _ => return Err(self.refused("a curve whose loops cancel has no area to keep", "use another --shape")),
         };
         nodes.iter_mut().for_each(|node| *node *= scale);
@@ -288,8 +291,10 @@ mod tests {
         let mut nodes = ellipse();
         near.fit(&mut nodes).unwrap();
         assert_eq!(nodes, ellipse());
-        let mut eight: Vec<DVec2> =
-            (0..64).map(|i| TAU * (f64::from(i) + 0.5) / 64.0).map(|t| DVec2::new(t.sin(), (2.0 * t).sin())).collect();
+        let mut eight: Vec<DVec2> = (0..64)
+            .map(|i| TAU * (f64::from(i) + 0.5) / 64.0)
+            .map(|t| DVec2::new(t.sin(), (2.0 * t).sin() - 0.1 * t.cos()))
+            .collect();
         let error = Sizes::Kept(Conserved::Area, [1.0, 0.0]).fit(&mut eight).unwrap_err().to_string();
         assert!(error.starts_with("--conserve-at 1: a curve whose loops cancel"), "{error}");
     }

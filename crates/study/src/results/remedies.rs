@@ -2,8 +2,12 @@
 
 use curvelax_ensemble::{
     Spec,
-    request::spec::{Pace, Pull},
+    request::{
+        drawn::Drawn,
+        spec::{Pace, Pull},
+    },
 };
+use curvelax_flow::forcing::Drive;
 
 /// How members ran, as far as remedies depend on it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,7 +27,7 @@ impl Remedies {
             geometric: spec.is_geometric(),
             adaptive: matches!(spec.pace(), Pace::Adaptive(_)),
             pulled: spec.pull != Pull::Rate(0.0),
-            driven: spec.drive.is_some() || spec.sweep.has("drive"),
+            driven: spec.sweep.has("drive") || spec.drive.as_ref().is_some_and(is_inwards),
             keeps_both: spec.keeps_both(),
             stops: spec.stops_when_relaxed(),
         }
@@ -67,6 +71,11 @@ impl Remedies {
     }
 }
 
+/// Whether a force may push curves inwards.
+fn is_inwards(drive: &Drawn<Drive>) -> bool {
+    drive.is_drawn() || !matches!(drive.typical(), Drive::Constant(force) if *force <= 0.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -83,7 +92,7 @@ mod tests {
         assert!(!pulled.of_drift().contains("auto") && pulled.of_failures().contains("ten times auto"));
         assert!(of("drive = 0.5").of_failures().contains("--adaptive --pull auto helps"));
         assert!(of("drive = 0.5").of_failures().contains("sides of a thin curve meet"));
-        assert!(!pulled.of_failures().contains("sides"));
+        assert!(!pulled.of_failures().contains("sides") && !of("drive = -0.5").of_failures().contains("sides"));
     }
 
     #[test]
