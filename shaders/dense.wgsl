@@ -107,8 +107,8 @@ const STRAIGHT = 0u;
 const EXPONENTIAL = 1u;
 const SMOOTH = 2u;
 
-/// The excess inside a step: on a straight line; its logarithm, relative to the start, on a straight line to `fallen`; or
-/// on `arc`.
+/// The excess inside a step: on a straight line; its logarithm, relative to the start, on a straight line to `fallen`;
+/// or on `arc`.
 struct Fall { kind: u32, fallen: real, arc: Arc }
 
 /// The fall in an adaptive step of length h, with the derivatives of ln excess at its end.

@@ -1,13 +1,13 @@
 // The entry point's work: one workgroup advances one member by up to `dispatch.steps` steps towards its goal. Twin of
-// crates/flow/src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An adaptive
-// step is retried with a shorter length until that is too short to mean anything.
+// crates/flow/src/scheme/evolve.rs. A fixed step that fails is not accepted: the member ends in its last good state. An
+// adaptive step is retried with a shorter length until that is too short to mean anything.
 //
 // A dispatch also ends when its sweeps are used up. The attempt then pauses: the increments so far are stored, and the
 // next dispatch recomputes the same rows and continues sweeping. Results do not depend on where a dispatch ends, to the
 // last bit.
 
-/// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that are
-/// solved, the sweeps made for the next one, the length of the step and that of the last one.
+/// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that
+/// are solved, the sweeps made for the next one, the length of the step and that of the last one.
 struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;
@@ -275,7 +275,8 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     counters.refused = 0u;
 }
 
-/// Aims the next step at the place where the excess falls to the relaxation threshold, if its slope is more than rounding.
+/// Aims the next step at the place where the excess falls to the relaxation threshold, if its slope is more than
+/// rounding.
 fn aim_at_relaxation() {
     let report = &all_reports[member].report;
     let relax_at = all_parameters[member].relax_at;

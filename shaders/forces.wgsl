@@ -1,5 +1,6 @@
-// The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without division;
-// the density of the energy; g = gamma + gamma'' and M of a crystal by powers of the tangent. Twin of crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
+// The forces on a curve: beta, and b(k) = c1 k + ... + c8 k^8 and phi(k) = k^2 - b(k)/k by Horner's rule without
+// division; the density of the energy; g = gamma + gamma'' and M of a crystal by powers of the tangent. Twin of
+// crates/flow/src/scheme/law.rs and crates/flow/src/scheme/forces.rs.
 
 /// The place of the length penalty in the law, after the coefficients.
 const LENGTH_PENALTY = 8u;
@@ -47,8 +48,8 @@ fn b_over_k(curvature: vec) -> vec {
 /// Complex numbers.
 struct Complex { x: vec, y: vec }
 
-/// What gamma + gamma'' and M are on segments, in the direction of their unit tangents, less 1; and the powers that they come
-/// from.
+/// What gamma + gamma'' and M are on segments, in the direction of their unit tangents, less 1; and the powers that
+/// they come from.
 struct Directed {
     stiffness: vec,
     diffusivity: vec,

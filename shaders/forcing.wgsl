@@ -45,8 +45,8 @@ fn act(k: vec, r: vec, beta: vec) -> vec {
 /// Increments of x and y.
 struct Moves { x: vec, y: vec }
 
-/// Adds a time tau of the force, along the inward normals of circles through the old nodes, to the increments of x and y;
-/// moves the nodes of the new curve.
+/// Adds a time tau of the force, along the inward normals of circles through the old nodes, to the increments of x and
+/// y; moves the nodes of the new curve.
 fn push(x: vec, y: vec) -> Moves {
     settle();
     let old = windows(x, y);
@@ -65,8 +65,8 @@ fn push(x: vec, y: vec) -> Moves {
     return by;
 }
 
-/// Moves the nodes of the new curve, which are `by` from the old ones, along the gradients of its area and its length to those
-/// that are kept.
+/// Moves the nodes of the new curve, which are `by` from the old ones, along the gradients of its area and its length
+/// to those that are kept.
 fn correct(old_x: vec, old_y: vec, by: Moves) {
     let x = rises_of_places(new_x);
     let y = rises_of_places(new_y);
@@ -95,8 +95,8 @@ fn correct(old_x: vec, old_y: vec, by: Moves) {
     }
 }
 
-/// Solves `(x y; y z) u = (s; t)`, with x, y, z of `m`, for what is kept, the area and the length: the other unknown is 0. On
-/// a circle both equations are one, and the length gives way.
+/// Solves `(x y; y z) u = (s; t)`, with x, y, z of `m`, for what is kept, the area and the length: the other unknown is
+/// 0. On a circle both equations are one, and the length gives way.
 fn balanced(m: vec, s: real, t: real) -> vec2<real> {
     let kept = u32(all_parameters[member].law[CONSERVED]);
     let area_kept = real(kept & 1u);

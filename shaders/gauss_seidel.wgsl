@@ -1,4 +1,5 @@
-// Coloured Gauss–Seidel sweeps to a residual. Twin of crates/flow/src/solver/gauss_seidel.rs; the sweeps are in sweeps.wgsl.
+// Coloured Gauss–Seidel sweeps to a residual. Twin of crates/flow/src/solver/gauss_seidel.rs; the sweeps are in
+// sweeps.wgsl.
 
 const SWEEPS_PER_CHECK = 8u;
 

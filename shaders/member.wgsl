@@ -161,9 +161,9 @@ struct Dispatch {
 /// The members that this dispatch advances, one per workgroup.
 @group(0) @binding(5) var<storage, read> all_due: array<u32>;
 
-/// Index of this workgroup's member. Its parameters are read where they are needed: copies of them in every thread would
-/// take the registers of its nodes. Its counters and its report are read and written by thread 0 alone, so they need no
-/// barrier; what other threads must know of them, thread 0 says in a `Plan` or a decision.
+/// Index of this workgroup's member. Its parameters are read where they are needed: copies of them in every thread
+/// would take the registers of its nodes. Its counters and its report are read and written by thread 0 alone, so they
+/// need no barrier; what other threads must know of them, thread 0 says in a `Plan` or a decision.
 var<private> member: u32;
 /// Length of the current step of the paper.
 var<private> tau: real;

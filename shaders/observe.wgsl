@@ -80,8 +80,8 @@ fn quotient(length: real, area: real) -> real {
     return length * length / (all_parameters[member].law[QUOTIENT] * abs(area));
 }
 
-/// The regular polygon that the sums of a curve are compared with, node by node: its edge, m² times the leading digits of
-/// the apothem of edge 1, and by how much the whole exceeds that, as a share.
+/// The regular polygon that the sums of a curve are compared with, node by node: its edge, m² times the leading digits
+/// of the apothem of edge 1, and by how much the whole exceeds that, as a share.
 struct Regular { edge: real, cross: real, rest: real }
 
 /// The polygon with about this length; none where numbers are long.
@@ -227,9 +227,9 @@ fn reaches_level(at: Observed) -> bool {
     return fell || rose;
 }
 
-/// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the two
-/// looks and at the end: if it is there at a look, or if the lines through the first two and through the last two values
-/// meet at or below it. A value that turns once does not fall below those lines.
+/// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the
+/// two looks and at the end: if it is there at a look, or if the lines through the first two and through the last two
+/// values meet at or below it. A value that turns once does not fall below those lines.
 fn falls_inside(start: real, early: real, late: real, end: real, level: real) -> bool {
     let fall = start - early;
     let rise = end - late;
@@ -248,8 +248,8 @@ fn passes(start: real, early: real, late: real, end: real, low: real, high: real
 /// The observables of the last attempt near its start and near its end.
 struct Looks { early: Observed, late: Observed }
 
-/// Whether an observable may have reached a level inside a step from `a` to `d` and left it again, by those at both ends
-/// and at the two looks. Where the host looks closely, it may turn out that none has.
+/// Whether an observable may have reached a level inside a step from `a` to `d` and left it again, by those at both
+/// ends and at the two looks. Where the host looks closely, it may turn out that none has.
 fn passes_level(a: Observed, looks: Looks, d: Observed) -> bool {
     let p = &all_parameters[member];
     let b = looks.early;

@@ -63,8 +63,8 @@ fn is_at_goal() -> bool {
     return (p.goal_high - report.progress.time_high) + (p.goal_low - report.progress.time_low) <= real(0.0);
 }
 
-/// The largest error of a step of length h of a curve of length `length`: an error below the rounding of the solves says
-/// nothing. Where solves are refined only that of the parts remains.
+/// The largest error of a step of length h of a curve of length `length`: an error below the rounding of the solves
+/// says nothing. Where solves are refined only that of the parts remains.
 fn allowed(h: real, length: real) -> real {
     if REFINED { return tolerance(); }
     let edge = length / real(NODES);

@@ -1,7 +1,7 @@
 // The ring of nodes, cut into blocks: which nodes or blocks are adjacent, and what a thread knows of its neighbours.
-// Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here.
-// Addresses in storage buffers are computed in state.wgsl and trace_on.wgsl. The scheme sees positions and curvatures by
-// their differences only, and forms them only here.
+// Twin of crates/flow/src/solver/ring.rs. All arithmetic on indices of nodes and blocks is here. Addresses in storage
+// buffers are computed in state.wgsl and trace_on.wgsl. The scheme sees positions and curvatures by their differences
+// only, and forms them only here.
 //
 // A thread owns one block of four or three consecutive nodes, stored in the components of a `vec`; a node's colour is
 // its place in the block. For a block of three the fourth component repeats the first node of the next block: it is

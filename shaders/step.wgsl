@@ -1,4 +1,5 @@
-// One step of the paper's scheme, from the curve in registers to the new one next to it. Twin of crates/flow/src/scheme/step.rs.
+// One step of the paper's scheme, from the curve in registers to the new one next to it. Twin of
+// crates/flow/src/scheme/step.rs.
 
 /// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 const NEGLIGIBLE = 0.1;

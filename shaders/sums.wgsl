@@ -1,5 +1,5 @@
-// Sums and maxima over a block, and sums over the ring of blocks. In Rust, `Sums` (crates/flow/src/solver/ring.rs) adds node after
-// node, in the same order.
+// Sums and maxima over a block, and sums over the ring of blocks. In Rust, `Sums` (crates/flow/src/solver/ring.rs) adds
+// node after node, in the same order.
 
 /// One row per block, for sums over the ring.
 var<workgroup> partials: array<vec, BLOCKS>;
@@ -38,8 +38,8 @@ fn ring_sums(part: vec) -> vec {
     return sum_of_partials();
 }
 
-/// The sum of all rows of `partials`, in order. A round of the loop adds eight: its counter, and the one that naga gives
-/// every loop, cost more than an addition.
+/// The sum of all rows of `partials`, in order. A round of the loop adds eight: its counter, and the one that naga
+/// gives every loop, cost more than an addition.
 ///
 /// The bound of the loop is read from the dispatch: a constant one is unrolled, which takes lavapipe's compiler as long
 /// as everything else together, and does not run faster.

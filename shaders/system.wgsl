@@ -1,4 +1,5 @@
-// A pentadiagonal system in registers, every row divided by its diagonal entry. Twin of crates/flow/src/solver/system.rs.
+// A pentadiagonal system in registers, every row divided by its diagonal entry. Twin of
+// crates/flow/src/solver/system.rs.
 
 /// Row i: a u[i-2] + b u[i-1] + u[i] + d u[i+1] + e u[i+2] = rhs.
 var<private> row_of: Rows;

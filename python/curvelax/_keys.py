@@ -88,7 +88,7 @@ class Keys(TypedDict, total=False):
     energy: str
     """Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is
     1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may
-    be a distribution. By default 1."""
+    be a distribution. 1 is the constant, in the geometric form as all others. By default 1."""
 
     diffusivity: str
     """Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
@@ -104,7 +104,8 @@ class Keys(TypedDict, total=False):
     vesicle: it is relaxed when relax-to of the way of its energy is left. By default neither."""
 
     conserve_at: Sequence[float]
-    """The area and the length that are kept; one number if one is. By default those of the polygon at the start."""
+    """The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are scaled
+    to it, and for both first stretched as by reduced-area. By default those of the polygon at the start."""
 
     mobility: float
     """Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in

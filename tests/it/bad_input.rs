@@ -86,7 +86,7 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--modes", "2-8", "2..=8"),
         ("--flow", "elastic", "elastic:0.5"),
         ("--flow", "wilmore", "did you mean `willmore`?"),
-        ("--energy", "sin:4,0.1", "`sin:4,0.1` is not cos:M,SIZE"),
+        ("--energy", "sin:4,0.1", "`sin:4,0.1` is not 1, cos:M,SIZE"),
         ("--energy", "cos:4,0.07", "ill-posed"),
         ("--diffusivity", "cos:4,1", "atoms would run uphill"),
         ("--conserve", "energy", "area, length, or area,length"),

@@ -380,7 +380,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
     for (name, value) in table {
         assert_eq!(constant(name), value, "{name}");
     }
-    // What a variant is, and the status of a solve, or of the loop over steps, inside the kernel; the host never sees it.
+    // What a variant is, and the status of a solve, or of the loop over steps, inside the kernel; the host never sees
+    // it.
     let of_the_kernel = [
         "IS_SHORT",
         "REFINED",

@@ -2,7 +2,12 @@
 
 use std::f64::consts::PI;
 
-use crate::common::program::{Row, column, number, run};
+use tempfile::TempDir;
+
+use crate::common::{
+    command::curvelax,
+    program::{Row, column, number, run},
+};
 
 /// One unperturbed ellipse of these half-axes under Willmore flow, with its series.
 fn ellipse(axes: &str, flags: &str, n: usize) -> (Row, Vec<Row>) {
@@ -121,6 +126,65 @@ fn a_population_of_vesicles_has_the_reduced_areas_that_are_drawn() {
         assert_eq!(row["status"], "relaxed");
         assert!(number(row, "t_relax") < number(row, "t_end"));
     }
+}
+
+#[test]
+fn starts_far_from_what_is_kept_are_brought_there() {
+    let of = |flags: &str| {
+        let common = "--flow willmore --adaptive=1e-4 --pull auto --t-end auto --points 64";
+        run(&format!("{common} --conserve {flags} {}", if flags.contains("curves") { "" } else { "--curves 4" }))
+    };
+    for (kept, at) in [
+        ("area", "3"),
+        ("area", "60"),
+        ("length", "5"),
+        ("length", "40"),
+        ("area,length", "6,12"),
+        ("area,length", "60,40"),
+        ("area,length", "6.283185,9.68844822"),
+    ] {
+        for row in of(&format!("{kept} --conserve-at {at}")).summary() {
+            for (name, at) in kept.split(',').zip(at.split(',').map(|at| at.parse::<f64>().unwrap())) {
+                // The first step does the last 0.4 %.
+                for (end, bound) in [("start", 4e-3), ("end", 1e-9)] {
+                    let off = number(&row, &format!("{name}_{end}")) / at - 1.0;
+                    assert!(off.abs() <= bound, "{kept} at {at}: {off:e} off at the {end}");
+                }
+            }
+            assert_eq!(row["status"], "relaxed", "{kept} at {at}");
+        }
+    }
+    let cells = of("area --curves 1 --sweep conserve-at=3,7").summary();
+    assert_eq!(column(&cells, "area_start").iter().map(|area| area.round()).collect::<Vec<_>>(), [3.0, 7.0]);
+    // A curve of another size has times that go as the square of the area.
+    let [own, given] = ["area", "area --conserve-at 60"].map(|flags| of(flags).summary());
+    for (own, given) in own.iter().zip(&given) {
+        let ratio = number(given, "t_relax") / number(own, "t_relax") * (number(own, "area_start") / 60.0).powi(2);
+        assert!((ratio - 1.0).abs() < 1e-4, "{ratio}");
+    }
+}
+
+#[test]
+fn a_start_that_is_never_so_round_is_refused_before_it_runs() {
+    let flags =
+        "--flow willmore --conserve area,length --conserve-at 3.14,6.3 --shape circle:1 --amplitude 0.1 --curves 2";
+    let home = TempDir::new().unwrap();
+    let output = curvelax(home.path(), &format!("run {flags} --out out"));
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && !home.path().join("out").exists(), "{error}");
+    assert!(error.contains("--conserve-at 3.14,6.3: member "), "{error}");
+    assert!(error.contains(" has at most 0.9426 as 4 pi A/L^2 whatever its stretch; use a longer L"), "{error}");
+}
+
+#[test]
+fn a_stretched_vesicle_has_the_time_of_its_own_length() {
+    // A circle of area π with 4πA/L² = 0.5 has (L/2π)⁴ = 4.
+    let done = run(
+        "--shape circle:1 --flow willmore --conserve area,length --reduced-area 0.5 --amplitude 0 --curves 1 --adaptive --pull auto \
+         --t-end auto",
+    );
+    let t_end = number(&done.summary()[0], "t_end");
+    assert!((t_end / 2.0 - 1.0).abs() < 1e-2, "{t_end}");
 }
 
 #[test]

@@ -57,7 +57,7 @@ columns! { Outcome:
     points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
     t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
-    t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a tenth of its length (a crystal to a quarter), and the rest is that of a circle; t_end is then a little earlier";
+    t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a tenth of its length (a crystal until it is at rest, at the latest to a quarter), and the rest is that of a circle; t_end is then a little earlier";
     reduced_area: optional = reduced_area, "with `--conserve`: 4πA/L² of the last polygon";
 }
 

@@ -27,6 +27,8 @@ pub const MOST_WAVES: usize = 2;
 pub const HIGHEST_WAVE: u32 = 12;
 /// The largest angle, ten turns: of a larger one few digits are left.
 const LARGEST_ANGLE: f64 = 3600.0;
+/// The function without waves, as text.
+const CONSTANT: &str = "1";
 /// Numbers of a wave in the law.
 pub const WAVE: usize = 3;
 /// Directions at which the least value of a function is looked for.
@@ -111,6 +113,9 @@ impl Waves {
 
 impl fmt::Display for Waves {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        if self.iter().next().is_none() {
+            return f.write_str(CONSTANT);
+        }
         for (i, Wave { mode, strength, degrees }) in self.iter().enumerate() {
             let plus = if i == 0 { "" } else { "+" };
             write!(f, "{plus}cos:{mode},{}", number(*strength))?;
@@ -127,13 +132,16 @@ impl FromStr for Waves {
 
     fn from_str(text: &str) -> Result<Waves, String> {
         let mut waves = Waves::default();
+        if text.trim() == CONSTANT {
+            return Ok(waves);
+        }
         let words: Vec<&str> = split_sum(text);
         if words.len() > MOST_WAVES {
             return Err(format!("{} waves; at most {MOST_WAVES}", words.len()));
         }
         for (i, word) in words.into_iter().enumerate() {
             let usage =
-                || format!("`{}` is not cos:M,SIZE or cos:M,SIZE,DEGREES, for example `cos:4,0.03`", echo(word));
+                || format!("`{}` is not 1, cos:M,SIZE or cos:M,SIZE,DEGREES, for example `cos:4,0.03`", echo(word));
             let numbers = parse_numbers(word.trim().strip_prefix("cos:").ok_or_else(usage)?)?;
             let (mode, strength, degrees) = match numbers[..] {
                 [mode, strength] => (mode, strength, 0.0),
@@ -453,9 +461,10 @@ mod tests {
     #[test]
     fn what_is_no_function_or_ill_posed_is_refused_with_the_reason() {
         for (text, part) in [
-            ("", "is not cos:M,SIZE"),
-            ("sin:4,0.1", "`sin:4,0.1` is not cos:M,SIZE"),
-            ("cos:4", "is not cos:M,SIZE"),
+            ("", "is not 1, cos:M,SIZE"),
+            ("sin:4,0.1", "`sin:4,0.1` is not 1, cos:M,SIZE"),
+            ("cos:4", "is not 1, cos:M,SIZE"),
+            ("2", "`2` is not 1, cos:M,SIZE"),
             ("cos:4,x", "`x` is not a finite number"),
             ("cos:2.5,0.1", "2.5 is not a number M of waves: use a whole one up to 12"),
             ("cos:13,0.001", "13 is not a number"),
@@ -473,6 +482,7 @@ mod tests {
             assert!(message.contains(part), "{text}: {message}");
         }
         assert!("cos:4,1".parse::<Diffusivity>().unwrap_err().contains("falls to 0, and atoms would run uphill"));
+        assert_eq!((energy("1"), energy(" 1 ").to_string()), (Energy::default(), "1".to_string()));
         assert!("cos:1,0.5".parse::<Diffusivity>().is_ok() && "cos:4,0.06".parse::<Energy>().is_ok());
     }
 

@@ -167,7 +167,8 @@ struct OfSpace {
 }
 
 impl OfSpace {
-    /// Extrapolates from three levels, the finest last, which `rounding` moves, where the tangent turns by `turn` at a node.
+    /// Extrapolates from three levels, the finest last, which `rounding` moves, where the tangent turns by `turn` at a
+    /// node.
     fn of([half, between, full]: [f64; 3], points: [usize; 3], rounding: [f64; 3], turn: f64) -> OfSpace {
         // (n/n')²: how much larger the leading error is.
         let [p, q] = [points[0], points[1]].map(|n| (points[2] as f64 / n as f64).powi(2));

@@ -33,8 +33,8 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Returns all variants in use, without those that differ only in being watched; traces need only fixed steps, since
-    /// adaptive ones are made of them.
+    /// Returns all variants in use, without those that differ only in being watched; traces need only fixed steps,
+    /// since adaptive ones are made of them.
     pub fn all() -> Vec<Variant> {
         let exchanges =
             |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);

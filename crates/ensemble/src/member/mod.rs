@@ -29,7 +29,7 @@ use mollifier::mollify;
 use outline_curve::{OutlineCurve, Treatment};
 pub(crate) use outline_set::OutlineSet;
 use outline_set::{OutlineCurves, check_equal_points, scale};
-use stretch::Stretch;
+use stretch::{Sizes, Stretch};
 
 use crate::{MemberValues, Spec, theory::horizon::CurveScale};
 use curvelax_base::random::Stream;
@@ -95,8 +95,8 @@ pub struct Family {
     seed: u64,
     /// The spec, if members have values of their own.
     drawn: Option<Arc<Spec>>,
-    /// 4πA/L² to which the curves of all members are stretched.
-    reduced_area: Option<f64>,
+    /// The sizes that the starts of all members are given.
+    sizes: Option<Sizes>,
     curves: Curves,
     /// Property of the outlines whose values are groups.
     group_by: Option<String>,
@@ -250,7 +250,7 @@ impl Family {
             perturbation,
             seed,
             drawn,
-            reduced_area: typical_reduced_area(spec),
+            sizes: Sizes::of(spec),
             curves,
             group_by: spec.group_by.clone(),
             sampling,
@@ -277,8 +277,8 @@ impl Family {
         let (sampler, scales) = (Arc::clone(&other.sampler), Arc::clone(&other.scales));
         let Spec { perturbation, seed, .. } = *spec;
         let drawn = drawn(spec);
-        let reduced_area = typical_reduced_area(spec);
-        Ok(Family { sampler, law, perturbation, seed, drawn, reduced_area, directions, scales, ..other.clone() })
+        let sizes = Sizes::of(spec);
+        Ok(Family { sampler, law, perturbation, seed, drawn, sizes, directions, scales, ..other.clone() })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points; or for
@@ -393,6 +393,7 @@ impl Family {
         }
         let origin = polygon::area_centroid(&nodes);
         nodes.iter_mut().for_each(|node| *node -= origin);
+        self.sizes.map_or(Ok(()), |sizes| sizes.fit(&mut nodes))?;
         let drawn = self.drawn(index).into_iter().map(|(_, number)| number).collect();
         let coefficients = self.feature_coefficients(&factor);
         let outline = self.outline(index);
@@ -439,9 +440,12 @@ impl Family {
             _ => None,
         };
         let forcing = values.as_ref().map(|values| values.forcing);
-        let reduced = values.as_ref().map_or(self.reduced_area, |values| values.reduced_area);
+        // Points that are nodes are moved as such.
+        let sizes = self.sizes.filter(|sizes| !sizes.are_kept() || self.sampling != Sampling::Points);
+        let own_reduced = values.as_ref().and_then(|values| values.reduced_area).map(Sizes::ReducedArea);
+        let reduced = own_reduced.or(sizes).and_then(|sizes| Some((sizes.reduced_area()?, sizes)));
         let curve = own.as_ref().map_or_else(|| self.sampler.curve(), |own: &OutlineCurve| &own.curve);
-        let stretch = reduced.map(|reduced| Stretch::to(reduced, curve, &factor, index)).transpose()?;
+        let stretch = reduced.map(|reduced| Stretch::to(reduced, curve, &factor, index)).transpose()?.flatten();
         let flow = values.and_then(|values| match values.flow {
             Cow::Owned(flow) => Some(flow),
             Cow::Borrowed(_) => None,
@@ -520,11 +524,6 @@ impl Family {
 /// The law of the perturbation at the typical values, whose modes all members have.
 fn law(spec: &Spec) -> Result<RadialLaw> {
     RadialLaw::new(*spec.amplitude.typical(), spec.modes, *spec.decay.typical())
-}
-
-/// The reduced area of all members, if it is given.
-fn typical_reduced_area(spec: &Spec) -> Option<f64> {
-    spec.reduced_area.as_ref().map(|drawn| *drawn.typical())
 }
 
 /// The spec, without its lists, if members have values of their own.

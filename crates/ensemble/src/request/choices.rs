@@ -336,7 +336,7 @@ where
     D: Deserializer<'de>,
     T: Deserialize<'de> + FromStr,
 {
-    deserializer.deserialize_any(ListVisitor(PhantomData))
+    deserializer.deserialize_any(ListVisitor { takes_one: false, of: PhantomData })
 }
 
 /// Reads a list that may be absent.
@@ -348,13 +348,43 @@ where
     list(deserializer).map(Some)
 }
 
-struct ListVisitor<T>(PhantomData<T>);
+/// Reads a list that may be absent, and of which one number is that number, so that it can be swept.
+pub(super) fn some_numbers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<f64>>, D::Error> {
+    deserializer.deserialize_any(ListVisitor { takes_one: true, of: PhantomData }).map(Some)
+}
+
+struct ListVisitor<T> {
+    takes_one: bool,
+    of: PhantomData<T>,
+}
+
+impl<T: FromStr> ListVisitor<T> {
+    /// A number alone.
+    fn alone<E: de::Error>(self, found: de::Unexpected, text: &str) -> Result<Vec<T>, E> {
+        match text.parse() {
+            Ok(number) if self.takes_one => Ok(vec![number]),
+            _ => Err(E::invalid_type(found, &"an array of numbers, or numbers with commas between them in quotes")),
+        }
+    }
+}
 
 impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
     type Value = Vec<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "an array of numbers, or numbers with commas between them in quotes")
+    }
+
+    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Vec<T>, E> {
+        self.alone(de::Unexpected::Float(number), &number.to_string())
+    }
+
+    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Vec<T>, E> {
+        self.alone(de::Unexpected::Signed(number), &number.to_string())
+    }
+
+    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Vec<T>, E> {
+        self.alone(de::Unexpected::Unsigned(number), &number.to_string())
     }
 
     fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {

@@ -91,24 +91,29 @@ impl Drawable for Drive {
 
 /// What is text with numbers in it.
 macro_rules! drawable_text {
-    ($($kind:ident)*) => {
+    ($($kind:ident, $expected:literal, $of_number:expr;)*) => {
         $(
             impl Drawable for $kind {
-                const EXPECTED: &'static str = "a string";
+                const EXPECTED: &'static str = $expected;
 
                 fn read(text: &str) -> Result<$kind, String> {
                     text.parse()
                 }
 
-                fn of_number(_: f64) -> Option<$kind> {
-                    None
+                fn of_number(number: f64) -> Option<$kind> {
+                    let of: fn(f64) -> Option<$kind> = $of_number;
+                    of(number)
                 }
             }
         )*
     };
 }
 
-drawable_text!(Flow Energy Diffusivity);
+drawable_text! {
+    Flow, "a string", |_| None;
+    Energy, "1, or text such as \"cos:4,0.03\"", |number| (number == 1.0).then(Energy::default);
+    Diffusivity, "1, or text such as \"cos:4,0.5\"", |number| (number == 1.0).then(Diffusivity::default);
+}
 
 /// A value that is the same for all members, or drawn for each.
 #[derive(Clone, Debug, PartialEq)]

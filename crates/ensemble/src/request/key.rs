@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     choices::{
         BackendChoice, FinalTime, Omega, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau, list, some_list,
+        some_numbers,
     },
     drawn::Drawn,
     event::Event,
@@ -211,7 +212,7 @@ keys! {
         flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", Evolution;
         /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG]
         /// is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any
-        /// number may be a distribution [default: 1]
+        /// number may be a distribution. 1 is the constant, in the geometric form as all others [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         energy: Option<Drawn<Energy>> = None, "GAMMA", Evolution;
         /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
@@ -227,8 +228,9 @@ keys! {
         /// vesicle: it is relaxed when --relax-to of the way of its energy is left [default: neither]
         #[serde(skip_serializing_if = "Option::is_none")]
         conserve: Option<Conserved> = None, "WHAT", Evolution;
-        /// The area and the length that are kept; one number if one is [default: those of the polygon at the start]
-        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
+        /// The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are
+        /// scaled to it, and for both first stretched as by --reduced-area [default: those of the polygon at the start]
+        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_numbers")]
         conserve_at: Option<Vec<f64>> = None, "A,L", Evolution;
         /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
         /// results, are then in its unit of time [default: 1]

@@ -374,7 +374,7 @@ impl Cell {
 
     /// Checks that the first members can be stretched as asked.
     fn check_stretch(&self) -> Result<()> {
-        let asked = self.spec.reduced_area.is_some();
+        let asked = self.spec.reduced_area.is_some() || self.spec.conserve_at.is_some();
         self.members().take(if asked { STRETCHED } else { 0 }).try_for_each(|member| self.member(member).map(drop))
     }
 

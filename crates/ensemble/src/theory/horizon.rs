@@ -118,7 +118,8 @@ impl CurveScale {
     pub fn first_radius(&self, flow: &Flow, forcing: &Forcing) -> f64 {
         match flow {
             _ if forcing.conserved.is_some() => {
-                forcing.radius_at_rest(self.radius, self.radius_of_length).unwrap_or(self.radius_of_length)
+                let of_length = if forcing.kept[1] == 0.0 { self.radius_of_length } else { forcing.kept[1] / TAU };
+                forcing.radius_at_rest(self.radius, of_length).unwrap_or(of_length)
             }
             Flow::SurfaceDiffusion => (self.radius * self.radius_of_length).sqrt(),
             _ => self.radius_of_length,

@@ -13,6 +13,7 @@ use curvelax_base::{
     error::{Error, Result},
     text::{number, rounded},
 };
+use curvelax_flow::forcing::Drive;
 
 /// The cap of `--t-end auto` over the time that theory expects: it covers members that differ from the curve of the
 /// cell, and the start, of which linear theory knows nothing.
@@ -74,6 +75,7 @@ pub fn warnings(spec: &Spec, scales: &[CurveScale]) -> Vec<String> {
         far_tau(spec, tau),
         far_end(spec, scale),
         strong_crystal(spec),
+        unstable_feedback(spec),
         not_followed(spec, scale),
     ];
     all.into_iter().flatten().collect()
@@ -105,6 +107,18 @@ fn strong_crystal(spec: &Spec) -> Option<String> {
             short(1.0 - PROVED_ANISOTROPY)
         )
     })
+}
+
+fn unstable_feedback(spec: &Spec) -> Option<String> {
+    let drive = spec.drive.as_ref()?;
+    match *drive.typical() {
+        Drive::Feedback { gain, area } if gain < 0.0 => Some(format!(
+            "--drive {drive}: with C below 0 the area goes away from A0 = {}, ever faster: it grows without end if it is \
+             larger, and shrinks to a point if it is smaller; use C above 0 to bring it to A0",
+            number(area)
+        )),
+        _ => None,
+    }
 }
 
 /// To three digits.
@@ -172,7 +186,10 @@ fn cap(spec: &Spec, scales: &[CurveScale]) -> f64 {
 /// That time for members with these values: when they have relaxed, or vanished if that comes for sure.
 fn own_cap(spec: &Spec, values: &MemberValues, scale: &CurveScale) -> f64 {
     if spec.keeps_both() {
-        return SETTLED * scale.first_radius(&values.flow, &values.forcing).powi(4) / spec.mobility();
+        let own = scale.first_radius(&values.flow, &values.forcing);
+        // A start that is stretched is as much longer.
+        let radius = values.reduced_area.map_or(own, |reduced| scale.radius / reduced.sqrt());
+        return SETTLED * radius.powi(4) / spec.mobility();
     }
     match life(spec, values, scale) {
         Some(t) => t,
@@ -230,7 +247,8 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
         None if ends_itself => MARGIN * expected(spec, values, scale),
         None => f64::INFINITY,
     };
-    check_steps(spec, own_end, own_omega(rate), own_tau(rate))?;
+    let follows = life(spec, values, scale).is_some_and(|t| t <= spec.final_time());
+    check_steps(spec, own_end, follows, [own_omega(rate), own_tau(rate)])?;
     let most = strongest_pull(rate, n);
     match spec.pull {
         Pull::Rate(pull) if pull > most => {
@@ -261,8 +279,8 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
 }
 
 /// Checks the number of steps to a final time that does not suit the curve, or to the member's own end if that is
-/// before. An own end is asked for only where it matters: it is an integration.
-fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, own_omega: f64, own_tau: f64) -> Result<()> {
+/// before. An own end is asked for only where it matters: it is an integration. With `follows`, it is that end anyway.
+fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, follows: bool, [own_omega, own_tau]: [f64; 2]) -> Result<()> {
     let steps_to = |t_end: f64| match (spec.pace(), spec.omega()) {
         (Pace::Fixed(Tau::Auto), _) => t_end / own_tau,
         (Pace::Adaptive(_), Omega::Auto) if !spec.no_redistribution => t_end * own_omega,
@@ -280,7 +298,18 @@ fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, own_omega: f64, own_tau: 
         Pace::Fixed(_) => format!("of {}, --tau auto", short(own_tau)),
         Pace::Adaptive(_) => format!("of at most about 1/omega, and --omega auto is {}", short(own_omega)),
     };
-    let allowed = format!("use --t-end {} or less, or auto", short(t_end * (MAX_STEPS / steps)));
+    let most = short(t_end * (MAX_STEPS / steps));
+    if let (Some(drive), true) = (&spec.drive, follows) {
+        let problem =
+            format!("members that it shrinks are followed until they vanish, in about {steps:.1e} steps {of}");
+        return Err(Error::value(
+            "drive",
+            drive,
+            &problem,
+            &format!("use a stronger force, or --t-end {most} or less"),
+        ));
+    }
+    let allowed = format!("use --t-end {most} or less, or auto");
     Err(Error::value("t-end", FinalTime::At(t_end), &format!("about {steps:.1e} steps {of}"), &allowed))
 }
 
@@ -295,6 +324,30 @@ mod tests {
 
     fn final_time(text: &str) -> f64 {
         study(text).unwrap().spec().final_time()
+    }
+
+    #[test]
+    fn a_feedback_that_drives_the_area_away_is_warned_of() {
+        let warned = |drive: &str| {
+            let study = study(&format!("adaptive = 1e-3\npull = 'auto'\nt-end = 'auto'\ndrive = '{drive}'")).unwrap();
+            study.warnings().iter().any(|warning| warning.contains("with C below 0 the area goes away from A0 = 3,"))
+        };
+        assert!(warned("feedback:-1,3") && !warned("feedback:1,3"));
+    }
+
+    #[test]
+    fn a_force_that_takes_too_long_is_named_and_not_the_final_time() {
+        let text = "adaptive = 1e-3\npull = 'auto'\ndrive = 1e-9";
+        let told = |t_end: &str| study(&format!("{text}\nt-end = {t_end}")).map(drop).unwrap_err().to_string();
+        let message = told("'auto'");
+        assert!(
+            message.starts_with("--drive 1e-9: members that it shrinks are followed until they vanish"),
+            "{message}"
+        );
+        assert!(message.contains("use a stronger force, or --t-end 9"), "{message}");
+        // A time that was given is named itself.
+        let message = told("2e9");
+        assert!(message.starts_with("--t-end 2"), "{message}");
     }
 
     #[test]

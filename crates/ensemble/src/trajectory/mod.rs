@@ -196,8 +196,11 @@ impl Trajectory<'_> {
         if let Some(own) = &mut self.vanishing {
             own.until = until;
         }
-        // One that is so small continues because it does not vanish in time.
-        self.vanishing.take_if(|own| own.is_due(&self.report.now));
+        // One that is so small goes on because it does not vanish in time, or was not at rest.
+        let (now, report) = (Observables::new(&self.report.now, 1.0, self.unit), &self.report.now);
+        let in_time = |own: &Vanishing| self.vanishes_at(own, &now).is_some();
+        let gone = self.vanishing.as_ref().is_some_and(|own| own.is_due(report) && !in_time(own));
+        self.vanishing.take_if(|own| gone || !own.lower(report));
         Ok(())
     }
 
@@ -224,12 +227,10 @@ impl Trajectory<'_> {
     /// Ends the member if it is at the length at which that is decided, and vanishes before its final time.
     fn look_whether_it_vanishes(&mut self) {
         let now = Observables::new(&self.report.now, 1.0, self.unit);
-        let due = |own: &mut Vanishing| self.counters.status == 0 && own.is_due(&self.report.now);
+        let at = &self.report.now;
+        let due = |own: &mut Vanishing| self.counters.status == 0 && own.is_due(at) && !own.is_put_off(at);
         if let Some(own) = self.vanishing.take_if(due) {
-            // The unit of time over that of length to the fourth is the inverse mobility.
-            let inverse_mobility = self.time_unit / self.unit.powi(4);
-            let at = own.left(&now).map(|left| self.now() + left * inverse_mobility);
-            self.t_vanish = at.filter(|t| *t <= self.t_end);
+            self.t_vanish = self.vanishes_at(&own, &now);
             if self.t_vanish.is_some() {
                 self.counters.status = Status::Vanished as u32;
             }
@@ -238,6 +239,13 @@ impl Trajectory<'_> {
         if let Some(own) = self.vanishing.as_mut().filter(|own| own.until <= time) {
             own.look_ahead(time, &now, self.unit);
         }
+    }
+
+    /// When a curve like this vanishes, if that is before its final time.
+    fn vanishes_at(&self, own: &Vanishing, now: &Observables) -> Option<f64> {
+        // The unit of time over that of length to the fourth is the inverse mobility.
+        let inverse_mobility = self.time_unit / self.unit.powi(4);
+        own.left(now).map(|left| self.now() + left * inverse_mobility).filter(|t| *t <= self.t_end)
     }
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {

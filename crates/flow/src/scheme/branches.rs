@@ -29,8 +29,8 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// Returns whether solutions are refined: those of adaptive steps in f32 by the direct solver. Fixed steps are off by
-    /// more, and sweeps stop at their tolerance.
+    /// Returns whether solutions are refined: those of adaptive steps in f32 by the direct solver. Fixed steps are off
+    /// by more, and sweeps stop at their tolerance.
     pub fn is_refined<N: Number, S: Solves>(&self) -> bool {
         N::IS_SHORT && self.adaptive && !S::FACTS.sweeps && !self.law.is_crystal()
     }

@@ -5,7 +5,8 @@
 //! old state is a sum of differences:
 //! `f - M k = ∂b + (r k β)_i k_i - Σ_j off_ij (k_j - k_i)`.
 //!
-//! Of a crystal, the stiff terms are those of w = g k with M at the nodes: a constant w is in their kernel, a constant k is not.
+//! Of a crystal, the stiff terms are those of w = g k with M at the nodes: a constant w is in their kernel, a constant
+//! k is not.
 
 use super::{Curve, Parameters, forces, state::Motion};
 use crate::{

@@ -50,8 +50,8 @@ fn clock<T: Real>(run: &Run<T>, taken: &Taken<T>) -> (T, T) {
     (from, from + taken.h)
 }
 
-/// Adds the excess at the end of a step, or of a part of an adaptive one, to the fit while it is inside the window: from the
-/// first time in the window to the first time below it.
+/// Adds the excess at the end of a step, or of a part of an adaptive one, to the fit while it is inside the window:
+/// from the first time in the window to the first time below it.
 fn fit<T: Real>(run: &mut Run<T>, [from, to]: [T; 2], [before, after]: [T; 2]) {
     let Run { report, counters, parameters: p, .. } = run;
     let decay = &mut report.decay;

@@ -6,11 +6,11 @@ use crate::number::{
     place::{coordinate, placed},
 };
 
-/// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand times,
-/// and the excess is a small difference of numbers near 1.
+/// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand
+/// times, and the excess is a small difference of numbers near 1.
 pub const RESOLVED: f64 = 131_072.0;
-/// The same inside steps in short numbers, whose excess is not that difference. Lengths of steps do not follow from such
-/// derivatives: two machines would make other ones.
+/// The same inside steps in short numbers, whose excess is not that difference. Lengths of steps do not follow from
+/// such derivatives: two machines would make other ones.
 pub const RESOLVED_SHORT: f64 = 8192.0;
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;

@@ -380,8 +380,8 @@ impl<N: Number> Team<N> {
         if near.any() { observe::gap(&self.work.new) } else { N::of(0.0) }
     }
 
-    /// Where an observable of the new curves has reached a level at which the member pauses, and where one may have done
-    /// so inside an adaptive step and left it again.
+    /// Where an observable of the new curves has reached a level at which the member pauses, and where one may have
+    /// done so inside an adaptive step and left it again.
     #[inline(always)]
     fn at_levels(&mut self, runs: &[&mut Run<N::Real>], branches: Branches) -> [N::Mask; 2] {
         let adaptive = branches.adaptive;
@@ -549,8 +549,8 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope
     counters.refused = 0;
 }
 
-/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold, if its slope is more
-/// than rounding.
+/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold, if its slope is
+/// more than rounding.
 fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;

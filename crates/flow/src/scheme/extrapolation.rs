@@ -31,12 +31,12 @@ pub const MOST_ORDER: u32 = 6;
 /// Highest order in f32: weights grow with the order, and with them the rounding of the parts.
 pub const MOST_ORDER_F32: u32 = 4;
 
-/// Weight of an error of the nodes over one of the curvature, both relative. A mode m of the curve has m²-1 times as much of it
-/// in the curvature.
+/// Weight of an error of the nodes over one of the curvature, both relative. A mode m of the curve has m²-1 times as
+/// much of it in the curvature.
 pub const NODE_WEIGHT: f64 = 20.0;
 
-/// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of the
-/// rows multiply it.
+/// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of
+/// the rows multiply it.
 pub const NOISE: f64 = 50.0;
 
 /// The last parts of a row, which go into the combinations.
@@ -230,8 +230,8 @@ pub fn tolerance<N: Number>(p: &Parameters<N>) -> N {
 /// The errors of order J-1 and J-2, in k and in ln r, of the step that ends in `new`.
 ///
 /// The error in k is relative to the largest |k|. While the shape is followed, i.e. until the excess is negligible, it
-/// is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle must not lose its
-/// modes in a tolerance measured by the circle.
+/// is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle must not lose
+/// its modes in a tolerance measured by the circle.
 ///
 /// In the geometric form the error of the nodes counts, too: relative to the radius and in the same proportion.
 #[inline(always)]

@@ -1,8 +1,8 @@
-//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, the force of the polygon, and the density of the energy.
-//! Twin of `shaders/forces.wgsl`.
+//! The forces on a curve: the normal velocity `β = -∂²_s k + b(k)`, the force of the polygon, and the density of the
+//! energy. Twin of `shaders/forces.wgsl`.
 //!
-//! Of a crystal, `β = -∂_s(M ∂_s w)` with w = g k and g = γ + γ″. g and M go by the directions of the old polygon, on its
-//! segments and between them at its nodes.
+//! Of a crystal, `β = -∂_s(M ∂_s w)` with w = g k and g = γ + γ″. g and M go by the directions of the old polygon, on
+//! its segments and between them at its nodes.
 //!
 //! Nothing else reads the law of a member: another law is a change here, in [`law`](super::law) and in
 //! [`Flow`](crate::flow::Flow).
@@ -35,8 +35,8 @@ pub fn tangent_of<N: Number>([x, y, length]: [N; 3]) -> [N; 2] {
     [x * inverse, y * inverse]
 }
 
-/// Fills what a crystal is on the segments and at the nodes, with the lengths of the edges, by which their directions are
-/// known.
+/// Fills what a crystal is on the segments and at the nodes, with the lengths of the edges, by which their directions
+/// are known.
 #[inline(always)]
 fn fill_directions<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
     let (n, one, law) = (old.len(), N::of(1.0), motion.law);
@@ -124,8 +124,8 @@ fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
     vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))
 }
 
-/// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along the
-/// inward normal to the chord between its neighbours, and α along the chord.
+/// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along
+/// the inward normal to the chord between its neighbours, and α along the chord.
 #[inline(always)]
 pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N; 2] {
     let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));

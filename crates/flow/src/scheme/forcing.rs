@@ -1,21 +1,21 @@
 //! Driving forces, and the area and length that are kept. Twin of `shaders/forcing.wgsl`.
 //!
-//! A force F along the inward normal is a part of the normal velocity β; it is no part of φ, as F/k would be singular where the
-//! curve is straight. The nodes move by τF after the position equation has been solved. What is kept adds λk + p to β, with
-//! multipliers by the lengths and curvatures that the scheme evolves: for both
+//! A force F along the inward normal is a part of the normal velocity β; it is no part of φ, as F/k would be singular
+//! where the curve is straight. The nodes move by τF after the position equation has been solved. What is kept adds λk
+//! + p to β, with multipliers by the lengths and curvatures that the scheme evolves: for both
 //!
 //! ```text
 //! ( Σrk²  Σrk ) (λ)     ( Σ r k β )
 //! ( Σrk   Σr  ) (p)  = -( Σ r β   )
 //! ```
 //!
-//! λ joins c₁ of `b(k)`. A force moves the nodes along the normals of the circles through each node and its neighbours: along
-//! those of the chords between the neighbours, which lean towards the longer edge, it moves nodes along the curve, too, and
-//! edges that are unequal grow apart for as long as it acts.
+//! λ joins c₁ of `b(k)`. A force moves the nodes along the normals of the circles through each node and its neighbours:
+//! along those of the chords between the neighbours, which lean towards the longer edge, it moves nodes along the
+//! curve, too, and edges that are unequal grow apart for as long as it acts.
 //!
-//! The position equation damps by `-DAMPING (2π/L)²` in place of φ: the paper's φ leaves mode 2 of a circle undamped, as a
-//! part of both components, and steps would be no longer than R⁴/3 even at rest. The increments are those of the same force;
-//! so this changes the error of a step, not the limit.
+//! The position equation damps by `-DAMPING (2π/L)²` in place of φ: the paper's φ leaves mode 2 of a circle undamped,
+//! as a part of both components, and steps would be no longer than R⁴/3 even at rest. The increments are those of the
+//! same force; so this changes the error of a step, not the limit.
 //!
 //! The rest, of second order in the step and in the spacing, is corrected in the new polygon: its
 //! nodes move along the gradients of its own area and length until both are what they should be.
@@ -34,8 +34,8 @@ use crate::{
 /// Rounds of a correction. Each divides what is left by a thousand or more: the first takes an error of the step, the
 /// last one that of rounding.
 pub const ROUNDS: usize = 4;
-/// -φ of the position equation where forces act, in units of `(2π/L)²`. Below 2.6 mode 2 of a circle is not stable in steps of
-/// any length.
+/// -φ of the position equation where forces act, in units of `(2π/L)²`. Below 2.6 mode 2 of a circle is not stable in
+/// steps of any length.
 pub const DAMPING: f64 = 3.0;
 
 impl Kind {
@@ -91,8 +91,8 @@ pub fn act<N: Number>(
     total
 }
 
-/// Adds a time τ of the force that [`act`] has found, along the inward normals of circles through the old nodes, to the increments of x and y:
-/// into `by`, by which the nodes of the new curve move.
+/// Adds a time τ of the force that [`act`] has found, along the inward normals of circles through the old nodes, to the
+/// increments of x and y: into `by`, by which the nodes of the new curve move.
 #[inline(always)]
 pub fn push<N: Number>(
     old: &Curve<N>,
@@ -117,8 +117,9 @@ pub fn push<N: Number>(
     new.y.close();
 }
 
-/// Moves the nodes of a new curve, which are `by` from those of the old one, along the gradients of its area and its length to
-/// those that are kept. From the old nodes, so that they are rounded once. `gradients` is room for them, x and y of each.
+/// Moves the nodes of a new curve, which are `by` from those of the old one, along the gradients of its area and its
+/// length to those that are kept. From the old nodes, so that they are rounded once. `gradients` is room for them, x
+/// and y of each.
 #[inline(always)]
 pub fn correct<N: Number>(
     [old_x, old_y]: [&Ring<N>; 2],
@@ -162,8 +163,8 @@ pub fn correct<N: Number>(
 
 /// Solves `(aa ab; ab bb) (u; v) = (s; t)` for what is kept, the area and the length: the other unknown is 0.
 ///
-/// On a circle both equations are one, and the length gives way: where `aa bb - ab²` is below a share √ε of `aa bb`, v falls
-/// off with it. Without a branch, by which compilers would write every loop around it several times.
+/// On a circle both equations are one, and the length gives way: where `aa bb - ab²` is below a share √ε of `aa bb`, v
+/// falls off with it. Without a branch, by which compilers would write every loop around it several times.
 #[inline(always)]
 fn balanced<N: Number>([area_kept, length_kept]: [N; 2], [aa, ab, bb]: [N; 3], [s, t]: [N; 2]) -> [N; 2] {
     let share = area_kept * (ab / aa);

@@ -1,5 +1,5 @@
-//! The law of a member: `b(k)`, and `φ(k) = k² - b(k)/k` of the position equation; the waves of a surface energy γ and of a
-//! mobility M that depend on the direction. Twin of the beginning of `shaders/forces.wgsl`.
+//! The law of a member: `b(k)`, and `φ(k) = k² - b(k)/k` of the position equation; the waves of a surface energy γ and
+//! of a mobility M that depend on the direction. Twin of the beginning of `shaders/forces.wgsl`.
 //!
 //! Only [`forces`](super::forces), the position equation and [`observe`](super::observe) ask for its values. Waves are
 //! powers of the unit tangent, without angles.
@@ -155,8 +155,8 @@ impl<N: Number> Law<N> {
     /// The same at the node between two segments: `[γ + γ″, M]` in the direction that halves the angle between their
     /// tangents.
     ///
-    /// The mean of the powers on both sides has that direction, and the length cos(mθ/2). With Δ between them, 1 + Δ²/8 makes
-    /// up for it, but for (mθ)⁴/400.
+    /// The mean of the powers on both sides has that direction, and the length cos(mθ/2). With Δ between them, 1 + Δ²/8
+    /// makes up for it, but for (mθ)⁴/400.
     #[inline(always)]
     pub fn between(&self, before: &Directed<N>, after: &Directed<N>) -> [N; 2] {
         let one = N::of(1.0);

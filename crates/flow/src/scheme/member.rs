@@ -285,7 +285,8 @@ pub struct Counters {
     pub sweeps_k: u32,
     /// Sweeps on position systems in this dispatch.
     pub sweeps_x: u32,
-    /// Where the kernel paused inside an attempt: twice the number of finished parts, plus one after a curvature solve. The CPU never pauses.
+    /// Where the kernel paused inside an attempt: twice the number of finished parts, plus one after a curvature solve.
+    /// The CPU never pauses.
     pub phase: u32,
     /// Sweeps that the paused solve has made.
     pub solve_sweeps: u32,
@@ -295,7 +296,8 @@ pub struct Counters {
     pub fit_over: u32,
     /// Times of the grid that the member has passed.
     pub noted: u32,
-    /// 1: an observable may have reached a level inside the last adaptive step and left it again, and the member paused.
+    /// 1: an observable may have reached a level inside the last adaptive step and left it again, and the member
+    /// paused.
     pub passed: u32,
 }
 

@@ -1,8 +1,8 @@
 //! Sums and maxima of a curve, which determine its report, status and events. Twin of
 //! `shaders/observe.wgsl`.
 //!
-//! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r. Of a crystal, energy
-//! and excess are those of the polygon, by the directions of its edges.
+//! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r. Of a crystal,
+//! energy and excess are those of the polygon, by the directions of its edges.
 
 use super::{
     Curve, Parameters,
@@ -43,7 +43,8 @@ pub struct CurveSums<N> {
     pub length: N,
     /// `½ Σ x_{i-1} × x_i`.
     pub area: N,
-    /// `Σ (½k_i² + λ) r_i`; of a crystal `Σ γ |e_i|`, in the same unit; where the area or the length is kept, that of the polygon.
+    /// `Σ (½k_i² + λ) r_i`; of a crystal `Σ γ |e_i|`, in the same unit; where the area or the length is kept, that of
+    /// the polygon.
     pub energy: N,
     /// Windings of the edge vector round the origin.
     pub turning: N,
@@ -220,11 +221,12 @@ fn quotient<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
     tension * tension / (p.law[QUOTIENT] * area.abs())
 }
 
-/// The regular polygon that the sums of a curve in f32 are compared with, node by node: the length and the area of a curve
-/// that is nearly a circle say nothing of its excess once they are rounded.
+/// The regular polygon that the sums of a curve in f32 are compared with, node by node: the length and the area of a
+/// curve that is nearly a circle say nothing of its excess once they are rounded.
 ///
-/// With edges m and `C = m²/(2 tan(π/n))` at each node its quotient is just [`Parameters::polygon_ratio`]. So with the mean
-/// of `(|e_i| - m)/m`, λ, and that of `(x_{i-1} × x_i - C)/C`, σ, the excess is that times `((1 + λ)² - (1 + σ))/(1 + σ)`.
+/// With edges m and `C = m²/(2 tan(π/n))` at each node its quotient is just [`Parameters::polygon_ratio`]. So with the
+/// mean of `(|e_i| - m)/m`, λ, and that of `(x_{i-1} × x_i - C)/C`, σ, the excess is that times `((1 + λ)² - (1 +
+/// σ))/(1 + σ)`.
 #[derive(Clone, Copy, Debug)]
 struct Regular<N> {
     nodes: N,
@@ -303,7 +305,8 @@ fn coarse<N: Number>(mut value: N) -> N {
 
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
 ///
-/// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A. Of a crystal, `γ|e|` stands for the length of an edge.
+/// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A. Of a crystal, `γ|e|` stands for the length of an
+/// edge.
 #[inline(always)]
 pub fn decline<N: Number>(
     curve: &Curve<N>,
@@ -405,8 +408,8 @@ pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask 
 }
 
 /// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the
-/// two [`LOOKS`] and at the end: if it is there at a look, or if the lines through the first two and through the last two
-/// values meet at or below it. A value that turns once does not fall below those lines.
+/// two [`LOOKS`] and at the end: if it is there at a look, or if the lines through the first two and through the last
+/// two values meet at or below it. A value that turns once does not fall below those lines.
 #[inline(always)]
 pub fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N::Mask {
     let (zero, between) = (N::of(0.0), N::of((LOOKS[1] - LOOKS[0]) / LOOKS[0]));

@@ -107,8 +107,8 @@ pub fn is_at_goal<T: Real>(progress: &Progress<T>, p: &Parameters<T>) -> bool {
 }
 
 /// Returns the largest error of a step of length h of a curve of length `length` with n nodes: an error below the
-/// rounding of the solves says nothing. The largest weight of their systems is about 16h/(L/n)⁴. Where solves are `refined`
-/// only that of the parts remains.
+/// rounding of the solves says nothing. The largest weight of their systems is about 16h/(L/n)⁴. Where solves are
+/// `refined` only that of the parts remains.
 pub fn allowed<T: Real>(h: T, length: T, n: T, p: &Parameters<T>, refined: bool) -> T {
     if refined {
         return tolerance(p);
@@ -126,8 +126,9 @@ pub fn growth<T: Real>(error: T, order: u32, allowed: T) -> T {
     (T::of(SAFETY) * root).max(T::of(MIN_GROWTH)).min(T::of(MAX_GROWTH))
 }
 
-/// Returns the length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or 0 if it does
-/// not fall: the ends of a step are more exact than what lies inside. Slope and bend of ln excess are in units of `taken`.
+/// Returns the length of a step that ends shortly behind the place where ln excess has fallen by `-fall`, or 0 if it
+/// does not fall: the ends of a step are more exact than what lies inside. Slope and bend of ln excess are in units of
+/// `taken`.
 pub fn aim<T: Real>(fall: T, slope: T, bend: T, taken: T) -> T {
     let two = T::of(2.0);
     if !slope.le(T::of(0.0)) {
@@ -143,9 +144,9 @@ fn work<T: Real>(order: u32, ratio: T) -> T {
     T::of(f64::from(parts(order))) / ratio
 }
 
-/// Returns the length and the order after a step of length `length` and order `order`, with the errors of that order and
-/// of the one below: of the two, and the one above, the order that makes the most progress for its work. The order only
-/// rises if the step may grow.
+/// Returns the length and the order after a step of length `length` and order `order`, with the errors of that order
+/// and of the one below: of the two, and the one above, the order that makes the most progress for its work. The order
+/// only rises if the step may grow.
 pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, allowed: Allowed<T>) -> (T, u32) {
     let own = growth(errors[0], order, allowed.error).min(most_growth);
     if order > LEAST_ORDER {

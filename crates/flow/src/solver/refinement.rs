@@ -1,8 +1,8 @@
 //! Iterative refinement of a solution, where numbers have few digits.
 //!
 //! A solve in f32 is off by some `16τ/h⁴·ε` of itself, most of it in the slowest modes, which the residual hardly shows
-//! unless it is computed by differences of differences ([`Equations::applied`]). What it leaves is solved for by the same
-//! matrix, and added.
+//! unless it is computed by differences of differences ([`Equations::applied`]). What it leaves is solved for by the
+//! same matrix, and added.
 
 use super::{
     Blocks, Equation, Equations, Memory, Ring, Solves,

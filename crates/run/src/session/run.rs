@@ -164,7 +164,8 @@ fn advance(
         report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());
         let progress = std::mem::take(&mut progress);
         let mut shown = Shown { report, host };
-        let mut sink = LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
+        let mut sink =
+            LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
         simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), progress, &mut sink)?;
     }
     Ok(())

@@ -205,8 +205,8 @@ pub fn adaptive_members(
     Ok(runs)
 }
 
-/// Tolerance of the sweeps in fixed steps. Where a residual is near its tolerance, one side may make a few sweeps more than the
-/// other, and the two differ by what they leave: less than the bounds, in f32, too.
+/// Tolerance of the sweeps in fixed steps. Where a residual is near its tolerance, one side may make a few sweeps more
+/// than the other, and the two differ by what they leave: less than the bounds, in f32, too.
 const FIXED_SWEEPS: f64 = 1e-5;
 /// The same in adaptive runs: so small that they go to their rounding limit, since combinations of rows amplify what
 /// sweeps leave.

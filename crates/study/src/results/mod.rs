@@ -5,6 +5,7 @@ pub mod comparison;
 pub mod discretisation;
 pub mod explained;
 pub mod provenance;
+mod remedies;
 pub mod scaling;
 pub mod shortfall;
 pub mod tally;

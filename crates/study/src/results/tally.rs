@@ -6,7 +6,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::treatment::{FinerMembers, MollifiedMembers};
+use super::{
+    remedies::Remedies,
+    treatment::{FinerMembers, MollifiedMembers},
+};
 use curvelax_base::error::Result;
 use curvelax_ensemble::{
     LevelTimes, Mollified, Outcome, Spec, Status,
@@ -40,6 +43,8 @@ pub struct Tally {
     pub stops: bool,
     /// Whether a driving force may make members vanish.
     pub driven: bool,
+    /// What helps those that failed.
+    remedies: Remedies,
     /// What distinguishes the cells.
     sweep: Sweep,
     /// Rows of the levels.
@@ -299,6 +304,7 @@ impl Tally {
             refined: spec.refine,
             stops,
             driven,
+            remedies: Remedies::of(spec),
             sweep,
             levels: levels.rows(),
             events,

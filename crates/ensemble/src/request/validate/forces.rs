@@ -8,7 +8,7 @@ use crate::request::{
 };
 use curvelax_base::{
     error::{Error, Result},
-    text::number,
+    text::{number, rounded},
 };
 use curvelax_curve::Sampling;
 use curvelax_flow::{flow::Flow, forcing::Conserved};
@@ -23,8 +23,11 @@ impl Spec {
         };
         let refused = |problem: &str, allowed: &str| Err(Error::value(key, &value, problem, allowed));
         if self.flow != Flow::SurfaceDiffusion.into() {
-            let problem =
-                format!("only surface diffusion has one that depends on the direction, not --flow {}", self.flow);
+            let problem = format!(
+                "only surface diffusion has one that depends on the direction, and the scheme has b(k) of --flow {} for a \
+                 constant one only",
+                self.flow
+            );
             return refused(&problem, "leave out one of the two");
         }
         self.check_geometric("with it a crystal creeps at rest", &format!("--{key} {value}"))?;
@@ -64,11 +67,15 @@ impl Spec {
         self.check_stretch()?;
         let Some(drive) = &self.drive else { return Ok(()) };
         if let Some(conserved) = self.conserve {
-            let problem = format!("a flow is driven or keeps something, and --conserve {conserved} is given");
+            let reason = match conserved.keeps_area() {
+                true => "the pressure that keeps the area takes any force away",
+                false => "the scheme has no multiplier that keeps the length against a force",
+            };
+            let problem = format!("--conserve {conserved} is given, and {reason}");
             return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
         }
         let given = format!("--drive {drive}");
-        let vanish = format!("members are followed until they vanish, with {given}, and t_vanish has no limit yet");
+        let vanish = format!("members are followed until they vanish, with {given}, and levels have no t_vanish");
         self.check_limits(self.is_driven_inwards(), &vanish)?;
         self.check_geometric("its steps do not see errors of the nodes", &given)
     }
@@ -120,9 +127,16 @@ impl Spec {
             return refused("not an area or a length", "use finite numbers above 0");
         }
         match at[..] {
-            [area, length] if length * length < 4.0 * PI * area => {
-                let least = number((4.0 * PI * area).sqrt());
-                refused("a circle of this area is longer", &format!("use a length above {least}, or a smaller area"))
+            [area, length] => {
+                let n = self.points as f64;
+                let [circle, regular] = [PI, n * (PI / n).tan()].map(|square| 2.0 * (square * area).sqrt());
+                let what = match length {
+                    _ if length <= circle => "a circle".to_string(),
+                    _ if length <= regular => format!("a regular polygon of {n} nodes"),
+                    _ => return Ok(()),
+                };
+                let allowed = format!("use a length above {}, or a smaller area", rounded(regular, 8));
+                refused(&format!("{what} of this area is as long or longer"), &allowed)
             }
             _ => Ok(()),
         }

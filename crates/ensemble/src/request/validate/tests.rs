@@ -91,11 +91,11 @@ const REFUSED: &[(&str, &str)] = &[
     ),
     (
         "drive = 0.5\nrefine = true",
-        "--refine true: members are followed until they vanish, with --drive 0.5, and t_vanish has no limit yet; use",
+        "--refine true: members are followed until they vanish, with --drive 0.5, and levels have no t_vanish; use",
     ),
     (
         "drive = 0.5\nflow = 'willmore'\nconserve = 'length'",
-        "--drive 0.5: a flow is driven or keeps something, and --conserve length is given; leave out one",
+        "--drive 0.5: --conserve length is given, and the scheme has no multiplier that keeps the length against a force; leave out one",
     ),
     ("conserve = 'area'", "--conserve area: surface diffusion keeps the area anyway, and could not keep the length; "),
     ("conserve = 'length'\nenergy = 'cos:3,0.05'", "--conserve length: surface diffusion keeps the area anyway"),
@@ -127,7 +127,15 @@ const REFUSED: &[(&str, &str)] = &[
     ("conserve = 'area'\nflow = 'willmore'\nconserve-at = [-1]", "--conserve-at -1: not an area or a length; "),
     (
         "conserve = 'area,length'\nflow = 'willmore'\nconserve-at = [3, 6]",
-        "--conserve-at 3,6: a circle of this area is longer; use a length above 6.139",
+        "--conserve-at 3,6: a circle of this area is as long or longer; use a length above 6.14097",
+    ),
+    (
+        "conserve = 'area,length'\nflow = 'willmore'\nconserve-at = [3.14159, 6.2832]",
+        "--conserve-at 3.14159,6.2832: a regular polygon of 100 nodes of this area is as long or longer; use a length above 6.2842",
+    ),
+    (
+        "drive = 0.5\nflow = 'willmore'\nconserve = 'area'",
+        "--drive 0.5: --conserve area is given, and the pressure that keeps the area takes any force away; leave out one",
     ),
     (
         "reduced-area = 0.7",

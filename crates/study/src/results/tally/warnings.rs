@@ -18,10 +18,8 @@ impl Tally {
             // Members that creep are stalled, too, without a sweep.
             let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
             let direct = if stalled && swept { "where sweeps stalled, --solver direct helps; " } else { "" };
-            warnings.push(format!(
-                "{failed} of {members} failed (see `status`); {direct}unless the flow itself becomes singular, a smaller \
-                 --tau or --adaptive, or more --points, helps"
-            ));
+            warnings
+                .push(format!("{failed} of {members} failed (see `status`); {direct}{}", self.remedies.of_failures()));
         }
         warnings.extend(self.vanished());
         warnings.extend(self.late());
@@ -69,8 +67,8 @@ impl Tally {
         if drifted > 0 {
             warnings.push(format!(
                 "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
-                 their times and areas are unreliable; use --pull auto, a smaller --tau or --adaptive, or \
-                 more --points"
+                 their times and areas are unreliable; {}",
+                self.remedies.of_drift()
             ));
         }
         warnings
@@ -94,8 +92,7 @@ impl Tally {
     fn late(&self) -> Option<String> {
         let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
         let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
-        let longer = if self.stops { "a longer --t-end" } else { "a longer --t-end or --t-end auto" };
-        let remedy = format!("use {longer}, or a larger --relax-to or --relax-at");
+        let remedy = self.remedies.of_time();
         if late.is_empty() {
             return None;
         }

@@ -1,0 +1,104 @@
+//! What helps members that failed, drifted or did not relax in time, by how they ran.
+
+use curvelax_ensemble::{
+    Spec,
+    request::{
+        drawn::Drawn,
+        spec::{Pace, Pull},
+    },
+};
+use curvelax_flow::forcing::Drive;
+
+/// How members ran, as far as remedies depend on it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Remedies {
+    geometric: bool,
+    adaptive: bool,
+    pulled: bool,
+    driven: bool,
+    keeps_both: bool,
+    stops: bool,
+}
+
+impl Remedies {
+    /// Those of a run of `spec`.
+    pub(super) fn of(spec: &Spec) -> Remedies {
+        Remedies {
+            geometric: spec.is_geometric(),
+            adaptive: matches!(spec.pace(), Pace::Adaptive(_)),
+            pulled: spec.pull != Pull::Rate(0.0),
+            driven: spec.sweep.has("drive") || spec.drive.as_ref().is_some_and(is_inwards),
+            keeps_both: spec.keeps_both(),
+            stops: spec.stops_when_relaxed(),
+        }
+    }
+
+    /// Of members that failed.
+    pub(super) fn of_failures(&self) -> String {
+        let Remedies { geometric, adaptive, pulled, driven, .. } = *self;
+        let mut text = String::from("unless the flow itself becomes singular");
+        if driven {
+            text += ", as where a strong force makes the sides of a thin curve meet";
+        }
+        text += match (geometric, adaptive, pulled) {
+            (false, ..) => ", a smaller --tau or --adaptive, or more --points, helps",
+            (true, false, _) => ", --adaptive --pull auto helps, and more --points",
+            (true, true, false) => ", --pull auto helps, and more --points",
+            (true, true, true) => {
+                ", more --points help, and a --pull of ten times auto: with --energy, --drive or --conserve nodes must resolve the \
+                 curve, and a smaller --adaptive does not help (docs/method.md)"
+            }
+        };
+        text
+    }
+
+    /// Of members that drifted.
+    pub(super) fn of_drift(&self) -> &'static str {
+        match (self.pulled, self.geometric) {
+            (false, _) => "use --pull auto, a smaller --tau or --adaptive, or more --points",
+            (true, false) => "use a smaller --tau or --adaptive, or more --points",
+            (true, true) => "use more --points, or a stronger --pull",
+        }
+    }
+
+    /// Of members whose time was up.
+    pub(super) fn of_time(&self) -> &'static str {
+        match (self.keeps_both, self.stops) {
+            (true, _) => "use a longer --t-end, or a larger --relax-to",
+            (false, true) => "use a longer --t-end, or a larger --relax-to or --relax-at",
+            (false, false) => "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at",
+        }
+    }
+}
+
+/// Whether a force may push curves inwards.
+fn is_inwards(drive: &Drawn<Drive>) -> bool {
+    drive.is_drawn() || !matches!(drive.typical(), Drive::Constant(force) if *force <= 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(text: &str) -> Remedies {
+        Remedies::of(&Spec::from_toml(text).unwrap())
+    }
+
+    #[test]
+    fn a_remedy_is_none_that_the_run_has_already() {
+        let plain = of("");
+        assert!(plain.of_drift().contains("--pull auto") && plain.of_failures().contains("a smaller --tau"));
+        let pulled = of("adaptive = 1e-3\npull = 'auto'\nenergy = 'cos:4,0.03'");
+        assert!(!pulled.of_drift().contains("auto") && pulled.of_failures().contains("ten times auto"));
+        assert!(of("drive = 0.5").of_failures().contains("--adaptive --pull auto helps"));
+        assert!(of("drive = 0.5").of_failures().contains("sides of a thin curve meet"));
+        assert!(!pulled.of_failures().contains("sides") && !of("drive = -0.5").of_failures().contains("sides"));
+    }
+
+    #[test]
+    fn a_vesicle_has_no_relax_at() {
+        let vesicle = "flow = 'willmore'\nconserve = 'area,length'\nt-end = 'auto'";
+        assert_eq!(of(vesicle).of_time(), "use a longer --t-end, or a larger --relax-to");
+        assert!(of("").of_time().contains("--t-end auto") && !of("t-end = 'auto'").of_time().contains("--t-end auto"));
+    }
+}
