@@ -275,17 +275,23 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
     counters.refused = 0u;
 }
 
-/// Aims the next step at the place where the excess falls to the relaxation threshold, if its slope is more than
-/// rounding.
+/// Aims the next step at the place where the excess falls to the relaxation threshold, by its slope if that is more
+/// than rounding. In short numbers otherwise by its last fall.
 fn aim_at_relaxation() {
     let report = &all_reports[member].report;
     let relax_at = all_parameters[member].relax_at;
     let excess = report.now.excess;
     report.progress.aim = 0.0;
     let resolved = real(RESOLVED * EPSILON) <= abs(excess * report.progress.slope);
-    if all_counters[member].relax_step == NEVER && resolved && !(excess <= relax_at) && !(relax_at <= real(0.0)) {
-        let fall = ln_ratio(excess, relax_at);
-        report.progress.aim = aim(fall, report.progress.slope, report.progress.bend, report.progress.taken);
+    let is_ahead = all_counters[member].relax_step == NEVER && !(excess <= relax_at) && !(relax_at <= real(0.0));
+    if is_ahead && (resolved || IS_SHORT) {
+        var slope = report.progress.slope;
+        var bend = report.progress.bend;
+        if !resolved {
+            slope = ln_ratio(report.before.excess, excess);
+            bend = 0.0;
+        }
+        report.progress.aim = aim(ln_ratio(excess, relax_at), slope, bend, report.progress.taken);
     }
 }
 

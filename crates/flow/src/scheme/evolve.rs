@@ -353,7 +353,7 @@ impl<N: Number> Team<N> {
                 decay::follow(run, &taken);
                 if let Some(allowed) = allowed {
                     lengthen(run, stride, errors, decline, allowed);
-                    aim_at_relaxation(run, taken.after);
+                    aim_at_relaxation(run, taken.before, taken.after);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
                 run.counters.passed = passed.lane(lane).into();
@@ -549,15 +549,19 @@ fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope
     counters.refused = 0;
 }
 
-/// Aims the next step at the place where the excess, now `excess`, falls to the relaxation threshold, if its slope is
-/// more than rounding.
-fn aim_at_relaxation<T: Real>(run: &mut Run<T>, excess: T) {
+/// Aims the next step at the place where the excess, which has fallen from `before` to `excess`, falls to the
+/// relaxation threshold, by its slope if that is more than rounding. In short numbers, whose excess has more digits
+/// than its slope, otherwise by that fall.
+fn aim_at_relaxation<T: Real>(run: &mut Run<T>, before: T, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
     let resolved = T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
-    if counters.relax_step == NEVER && resolved && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0)) {
-        progress.aim = pace::aim(ln_ratio(excess, p.relax_at), progress.slope, progress.bend, progress.taken);
+    let is_ahead = counters.relax_step == NEVER && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0));
+    if is_ahead && (resolved || T::IS_SHORT) {
+        let [slope, bend] =
+            if resolved { [progress.slope, progress.bend] } else { [ln_ratio(before, excess), T::of(0.0)] };
+        progress.aim = pace::aim(ln_ratio(excess, p.relax_at), slope, bend, progress.taken);
     }
 }
 
