@@ -68,7 +68,7 @@ fn limits_in_f32_are_those_in_f64_within_their_errors() {
     // The control: errors that know nothing of rounding.
     println!("{farthest} errors of f64");
     assert!(farthest > 0.1);
-    // Beyond the nodes of f32 members go on in f64.
+    // Beyond the nodes of f32 members continue in f64.
     let numbers: BTreeSet<(bool, String)> = rows(&home.path().join("f32/levels.csv"))
         .iter()
         .map(|row| (number::<u64>(row, "points") > 320, row["precision"].clone()))

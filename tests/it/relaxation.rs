@@ -567,7 +567,7 @@ fn extrapolated_steps_have_their_orders() {
             let steps = match order {
                 ..4 => 40,
                 4 | 5 => 8,
-                _ => 5,
+                _ => 3,
             };
             let [a, b, c] = [1, 2, 4].map(|times| of(times * steps));
             let found = ((a - b) / (b - c)).abs().log2();

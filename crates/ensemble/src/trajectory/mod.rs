@@ -196,7 +196,7 @@ impl Trajectory<'_> {
         if let Some(own) = &mut self.vanishing {
             own.until = until;
         }
-        // One that is so small goes on because it does not vanish in time, or was not at rest.
+        // One that is so small continues because it does not vanish in time, or was not at rest.
         let (now, report) = (Observables::new(&self.report.now, 1.0, self.unit), &self.report.now);
         let in_time = |own: &Vanishing| self.vanishes_at(own, &now).is_some();
         let gone = self.vanishing.as_ref().is_some_and(|own| own.is_due(report) && !in_time(own));

@@ -58,7 +58,7 @@ pub(super) struct Target<N: Number> {
 }
 
 /// Tolerance below which a scaled residual is rounding error, in units of ε times the [size](system_size): no sweep,
-/// and no direct solve, gets further. At half of it, sweeps with over-relaxation were seen to go on for ever in f32.
+/// and no direct solve, gets further. At half of it, sweeps with over-relaxation were seen not to end in f32.
 pub const FLOOR: f64 = 2.0;
 
 /// Largest scaled row sum; more than [`BIG`] if an entry or a right-hand side is not finite.
