@@ -7,7 +7,7 @@ use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the excess, in units of ε.
-const OF_STEPS: f64 = 3e-5;
+const OF_STEPS: f64 = 3e-4;
 const OF_EXCESS: f64 = 0.1;
 
 /// The relaxation times of members at all levels.

@@ -29,7 +29,7 @@ use curvelax_gpu::kernel::Budget;
 pub(super) const ADAPTIVE: f64 = 1e-3;
 
 /// Fixed steps of a member that take as long as its adaptive run in the comparison.
-pub const ADAPTIVE_STEPS: u32 = 40;
+pub const ADAPTIVE_STEPS: u32 = 42;
 
 /// Compares the curves after `steps` steps, in dispatches of `budget`.
 pub fn runs<T: Evolves>(
