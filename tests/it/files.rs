@@ -137,7 +137,10 @@ fn the_files_have_the_columns_of_the_manual() {
          length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
          mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,wulff_distance,t_vanish,reduced_area"
     );
-    assert_eq!(header("levels.csv"), "member,level,cell,points,adaptive,status,t_relax,solves,turn,excess_start");
+    assert_eq!(
+        header("levels.csv"),
+        "member,level,cell,points,adaptive,precision,status,t_relax,solves,turn,excess_start"
+    );
     assert_eq!(header("series.csv"), "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift");
     assert_eq!(header("snapshots.csv"), "member,t,i,x,y,k,r");
     for row in done.summary() {

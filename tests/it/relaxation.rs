@@ -537,7 +537,7 @@ fn extrapolate(run: &mut Run<f64>, t: f64, steps: u32, order: u32) {
 
 #[test]
 fn extrapolated_steps_have_their_orders() {
-    let (circle, mode) = (wavy_circle(100, 1.0, 2, 0.0), wavy_circle(100, 1.0, 3, 1e-4));
+    let (circle, mode) = (wavy_circle(100, 1.0, 2, 0.0), wavy_circle(100, 1.0, 3, 1e-3));
     let radius: fn(&[DVec2]) -> f64 = crate::common::radius;
     for (name, flow, nodes, settling, t, measure) in [
         (
@@ -564,11 +564,7 @@ fn extrapolated_steps_have_their_orders() {
                 measure(&run.state.curve.positions().collect::<Vec<_>>())
             };
             // All three share the error of the spacing. Steps of high order soon leave nothing but rounding.
-            let steps = match order {
-                ..4 => 40,
-                4 | 5 => 8,
-                _ => 3,
-            };
+            let steps = if order < 4 { 40 } else { 12 };
             let [a, b, c] = [1, 2, 4].map(|times| of(times * steps));
             let found = ((a - b) / (b - c)).abs().log2();
             println!("{name}: order {order}: {found:.3}, differences {:.1e} {:.1e}", a - b, b - c);
@@ -578,7 +574,7 @@ fn extrapolated_steps_have_their_orders() {
             assert!((stirred && order > 3) || found > least, "{name}: order {found} instead of {order}");
             errors.push((a - c).abs());
         }
-        // With a fifth of the steps, orders from 4 on are as good as order 2 or better.
+        // With a third of the steps, orders from 4 on are as good as order 2 or better.
         assert!(errors[2..].iter().all(|error| *error < errors[0]), "{name}: {errors:?}");
     }
 }
