@@ -57,7 +57,7 @@ pub(super) struct Target<N: Number> {
     pub finite: N::Mask,
 }
 
-/// Tolerance below which a scaled residual is rounding error, in units of ε times the [size](system_size): no sweep,
+/// Tolerance below which a scaled residual is rounding error, in units of ε times the size of the system: no sweep,
 /// and no direct solve, gets further. At half of it, sweeps with over-relaxation were seen not to end in f32.
 pub const FLOOR: f64 = 2.0;
 
