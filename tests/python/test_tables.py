@@ -28,7 +28,7 @@ INTEGERS = {
     "series.csv": ["member"],
     "snapshots.csv": ["member", "i"],
 }
-TEXT = {"summary.csv": ["status"], "levels.csv": ["status"], "explained.csv": ["time", "feature"], "events.csv": ["event"],
+TEXT = {"summary.csv": ["status"], "levels.csv": ["status", "precision"], "explained.csv": ["time", "feature"], "events.csv": ["event"],
         "event_statistics.csv": ["event"], "event_levels.csv": ["event"]}
 # What only Parquet tells: integers and words of which some are empty.
 OPTIONAL_INTEGERS = {"explained.csv": ["chosen"]}
