@@ -20,7 +20,7 @@ FIELDS = ["x", "y", "k", "r"]
 
 
 def snapshots(
-    run: _curvelax.FinishedRun, seen: _curvelax.Seen | None, folder: Path, table: Callable[[str], Any]
+    run: _curvelax.FinishedRun, seen: _curvelax.SnapshotBuffer | None, folder: Path, table: Callable[[str], Any]
 ) -> xr.Dataset:
     """The snapshots of a run: from memory if all are there, else from its files."""
     import xarray as xr

@@ -22,7 +22,7 @@ def run(
     existing: str,
     progress: Callable[[int, int, float], object],
     say: Callable[[str], object],
-) -> tuple[str, Seen]:
+) -> tuple[str, SnapshotBuffer]:
     """Runs a spec in the folder ``out``; returns the overview and the snapshots."""
 
 def resume(
@@ -30,7 +30,7 @@ def resume(
 ) -> str | None:
     """Continues the run in ``out``; returns its overview, or ``None`` if it is finished."""
 
-class Seen:
+class SnapshotBuffer:
     """Snapshots that a run has passed on."""
 
     def arrays(self, members: list[int], times: list[float]) -> list[NDArray[np.float64]] | None:

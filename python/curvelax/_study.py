@@ -97,7 +97,7 @@ class Study:
         folder: Path,
         *,
         overview: str | None = None,
-        seen: _curvelax.Seen | None = None,
+        seen: _curvelax.SnapshotBuffer | None = None,
         temporary: bool = False,
     ) -> None:
         self.folder = folder

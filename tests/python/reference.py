@@ -14,8 +14,8 @@ import curvelax
 PAGE = pathlib.Path(__file__).resolve().parents[2] / "docs/python.md"
 HEAD = """# Python reference
 
-Every public name of the package `curvelax`, from its docstrings. [The package](../python/README.md) has the introduction,
-and the [flags](flags.md) are the keys that `run` takes.
+Every public name of the package `curvelax`, from its docstrings. [The package](../python/README.md) has the
+introduction, and the [flags](flags.md) are the keys that `run` takes.
 
 <!-- Generated from the package: python tests/python/reference.py -->
 """

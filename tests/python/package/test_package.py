@@ -771,7 +771,7 @@ class Package(unittest.TestCase):
         own = resources.files("curvelax")
         self.assertTrue((own / "py.typed").is_file())
         stubs = (own / "_curvelax.pyi").read_text()
-        for name in ["FinishedRun", "Seen", "run", "resume", "main", "check_place"]:
+        for name in ["FinishedRun", "SnapshotBuffer", "run", "resume", "main", "check_place"]:
             self.assertIn(name, stubs)
             self.assertTrue(hasattr(sys.modules["curvelax._curvelax"], name), name)
 
