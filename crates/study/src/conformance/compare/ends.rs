@@ -28,8 +28,8 @@ use curvelax_gpu::kernel::Budget;
 /// Tolerance of adaptive steps in the comparison.
 pub(super) const ADAPTIVE: f64 = 1e-3;
 
-/// Fixed steps of a member that take as long as its adaptive run in the comparison. With 40, sweeps in f32 at n = 64 end
-/// one member's step so near its end that one side makes a step more.
+/// Fixed steps of a member that take as long as its adaptive run in the comparison. With 40, sweeps in f32 at n = 64
+/// end one member's step so near its end that one side makes a step more.
 pub const ADAPTIVE_STEPS: u32 = 42;
 
 /// Compares the curves after `steps` steps, in dispatches of `budget`.
