@@ -64,16 +64,19 @@ impl Fields<'_> {
 
     /// The name of a status.
     pub fn status(&mut self) -> Result<Status> {
-        let word = self.word();
-        let status = Status::ALL.into_iter().find(|status| status.name() == word);
-        status.ok_or_else(|| self.unexpected(&Status::ALL.map(Status::name).join(", ")))
+        self.one_of(Status::ALL, Status::name)
     }
 
     /// The name of a precision.
     pub fn precision(&mut self) -> Result<Precision> {
-        let (word, all) = (self.word(), [Precision::F32, Precision::F64]);
-        let precision = all.into_iter().find(|precision| precision.name() == word);
-        precision.ok_or_else(|| self.unexpected(&all.map(Precision::name).join(", ")))
+        self.one_of([Precision::F32, Precision::F64], Precision::name)
+    }
+
+    /// One of these values, by its name.
+    fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N], name: impl Fn(T) -> &'static str) -> Result<T> {
+        let word = self.word();
+        let value = all.into_iter().find(|value| name(*value) == word);
+        value.ok_or_else(|| self.unexpected(&all.map(name).join(", ")))
     }
 
     /// A float; none if unknown.

@@ -172,14 +172,16 @@ impl OfSpace {
     fn of([half, between, full]: [f64; 3], points: [usize; 3], rounding: [f64; 3], turn: f64) -> OfSpace {
         // (n/n')²: how much larger the leading error is.
         let [p, q] = [points[0], points[1]].map(|n| (points[2] as f64 / n as f64).powi(2));
-        let two = full - (between - full) / (q - 1.0);
+        let two = |[_, between, full]: [f64; 3]| full - (between - full) / (q - 1.0);
         // Lagrange's weights at 0 for the abscissas p, q and 1.
-        let three = half * q / ((p - q) * (p - 1.0)) - between * p / ((p - q) * (q - 1.0))
-            + full * p * q / ((p - 1.0) * (q - 1.0));
-        let of_three = [q / ((p - q) * (p - 1.0)), p / ((p - q) * (q - 1.0)), p * q / ((p - 1.0) * (q - 1.0))];
-        let of_two = [0.0, 1.0 / (q - 1.0), q / (q - 1.0)];
-        let moved_by =
-            |weights: [f64; 3]| [0, 1, 2].map(|i| weights[i] * rounding[i]).into_iter().fold(0.0, f64::hypot);
+        let three = |[half, between, full]: [f64; 3]| {
+            half * q / ((p - q) * (p - 1.0)) - between * p / ((p - q) * (q - 1.0))
+                + full * p * q / ((p - 1.0) * (q - 1.0))
+        };
+        let alone = [0, 1, 2].map(|i| std::array::from_fn(|j| if i == j { rounding[i] } else { 0.0 }));
+        let moved = |by_each: [f64; 3]| by_each.into_iter().fold(0.0, f64::hypot);
+        let (moved_two, moved_three) = (moved(alone.map(two)), moved(alone.map(three)));
+        let [two, three] = [two([half, between, full]), three([half, between, full])];
         let noise = rounding.into_iter().fold(0.0, f64::max);
         let order = order([half, between, full], points);
         let farthest = [half - between, between - full, half - full].map(f64::abs).into_iter().fold(0.0, f64::max);
@@ -189,11 +191,11 @@ impl OfSpace {
         let asymptotic = is_resolved && (falls_by(ORDERS) || farthest < (SMALL * full).max(OF_NOISE * noise));
         let (t, error, rounding) = if asymptotic {
             let left = OF_SPACE * remainder(terms, turn.powi(2));
-            (three, if falls_by(ORDERS) { left } else { left.max(farthest) }, moved_by(of_three))
+            (three, if falls_by(ORDERS) { left } else { left.max(farthest) }, moved_three)
         } else {
             let bound = OF_OPEN * remainder(terms, turn.min(1.0));
             let few_nodes_explain = !is_resolved && falls_by(LOOSE_ORDERS);
-            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) }, moved_by(of_two))
+            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) }, moved_two)
         };
         OfSpace { t, error, rounding, order, asymptotic }
     }

@@ -120,18 +120,8 @@ pub fn step_by<N: Number, S: Solves>(
     if *traced {
         curvature.system.assemble(&equations);
     }
-    let for_k = match refined {
-        true => refinement::solve::<N, S, 1>(
-            &equations,
-            [&mut increments.k],
-            curvature,
-            of_curvature,
-            *blocks,
-            &control,
-            live,
-        ),
-        false => S::solve(&equations, [&mut increments.k], curvature, *blocks, &control, live),
-    };
+    let (unknown, remainder) = ([&mut increments.k], refined.then_some(of_curvature));
+    let for_k = refinement::solve::<N, S, 1>(&equations, unknown, curvature, remainder, *blocks, &control, live);
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -142,11 +132,8 @@ pub fn step_by<N: Number, S: Solves>(
         position.system.assemble(&equations);
     }
     let control = Control { negligible: rounding * radius, ..control };
-    let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = match refined {
-        true => refinement::solve::<N, S, 2>(&equations, unknowns, position, of_position, *blocks, &control, live),
-        false => S::solve(&equations, unknowns, position, *blocks, &control, live),
-    };
+    let (unknowns, remainder) = ([&mut increments.x, &mut increments.y], refined.then_some(of_position));
+    let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, remainder, *blocks, &control, live);
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);

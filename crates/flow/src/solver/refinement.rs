@@ -55,19 +55,19 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     }
 }
 
-/// Solves `equations` and refines the solution.
+/// Solves `equations` and refines the solution, if there is room for what it leaves.
 #[inline(always)]
 pub fn solve<N: Number, S: Solves, const F: usize>(
     equations: &impl Equations<N, F>,
     mut unknown: [&mut Ring<N>; F],
     memory: &mut Memory<N, F>,
-    remainder: &mut Remainder<N, F>,
+    remainder: Option<&mut Remainder<N, F>>,
     blocks: Blocks,
     control: &Control<N>,
     live: N::Mask,
 ) -> Swept<N> {
-    let Remainder { left, lacks } = remainder;
     let mut all = S::solve(equations, unknown.each_mut().map(|u| &mut **u), memory, blocks, control, live);
+    let Some(Remainder { left, lacks }) = remainder else { return all };
     for _ in 0..refinements(blocks.n) {
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
