@@ -5,7 +5,7 @@ use super::{
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, method, tampered},
-    twin::twin,
+    twin::{twin, without_ties},
 };
 use crate::conformance::{
     bounds::{Bound, DECAY, FIELDS, PACE, REPORT, growth},
@@ -28,9 +28,8 @@ use curvelax_gpu::kernel::Budget;
 /// Tolerance of adaptive steps in the comparison.
 pub(super) const ADAPTIVE: f64 = 1e-3;
 
-/// Fixed steps of a member that take as long as its adaptive run in the comparison. With 40, sweeps in f32 at n = 64
-/// end one member's step so near its end that one side makes a step more.
-pub const ADAPTIVE_STEPS: u32 = 42;
+/// Fixed steps of a member that take as long as its adaptive run in the comparison.
+pub const ADAPTIVE_STEPS: u32 = 40;
 
 /// Compares the curves after `steps` steps, in dispatches of `budget`.
 pub fn runs<T: Evolves>(
@@ -58,8 +57,19 @@ pub fn adaptive<T: Evolves>(
     budget: Budget,
     tamper: Option<Tamper>,
 ) -> Result<Vec<ConformanceRow>> {
-    let launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
+    let launches = adaptive_launches::<T>(solver, n, |_| ())?;
     ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
+}
+
+/// Members of adaptive steps, changed so.
+pub(super) fn adaptive_launches<T: Evolves>(
+    solver: Solver,
+    n: usize,
+    change: impl Fn(&mut [Run<f64>]),
+) -> Result<Vec<Run<f64>>> {
+    let mut launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
+    change(&mut launches);
+    launches.into_iter().map(|launch| without_ties::<T>(launch, &method(solver), n)).collect()
 }
 
 /// Compares members driven so after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`.
@@ -73,11 +83,14 @@ pub fn driven<T: Evolves>(
     budget: Budget,
     change: Option<fn(&mut Run<f64>)>,
 ) -> Result<Vec<ConformanceRow>> {
-    let mut launches = match steps {
-        Some(steps) => members(n, MEMBERS, steps)?,
-        None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
+    let launches = match steps {
+        Some(steps) => {
+            let mut launches = members(n, MEMBERS, steps)?;
+            driven.change(&mut launches);
+            launches
+        }
+        None => adaptive_launches::<T>(solver, n, |launches| driven.change(launches))?,
     };
-    driven.change(&mut launches);
     let mut changed = launches.clone();
     if let Some(change) = change {
         changed.iter_mut().for_each(change);

@@ -2,7 +2,7 @@
 
 use super::{
     device::{Left, on_gpu},
-    ends::{ADAPTIVE, ADAPTIVE_STEPS},
+    ends::adaptive_launches,
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
     setup::{Tamper, method, tampered},
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::conformance::{
     bounds::{Bound, EVENT, REPORT, growth},
-    cases::{MEMBERS, adaptive_members, members},
+    cases::{MEMBERS, members},
 };
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::evolve::Evolves;
@@ -36,7 +36,7 @@ struct Watched {
 }
 
 /// Compares the times at which watched observables reach their levels, within 100 fixed steps or adaptive ones over the
-/// time of [`ADAPTIVE_STEPS`], in dispatches of `budget`.
+/// time of [`ADAPTIVE_STEPS`](super::ADAPTIVE_STEPS), in dispatches of `budget`.
 pub fn events<T: Evolves>(
     adapter: &gpu::Gpu,
     solver: Solver,
@@ -47,7 +47,7 @@ pub fn events<T: Evolves>(
 ) -> Result<ConformanceRow> {
     let launches = match adaptive {
         false => members(n, MEMBERS, STEPS)?,
-        true => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
+        true => adaptive_launches::<T>(solver, n, |_| ())?,
     };
     let method = method(solver);
     let watched = watched::<T>(&launches, &method, n)?;

@@ -2,6 +2,7 @@
 
 use super::{device::Left, setup::blocks};
 use curvelax_base::error::Result;
+use curvelax_ensemble::schedule::Ticks;
 use curvelax_flow::scheme::{
     evolve::{Evolves, Team, evolve},
     extrapolation::LEAST_ORDER,
@@ -43,6 +44,41 @@ pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> 
     }
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
     Ok(Twin { left, longest, steepest, order, leverage })
+}
+
+/// How near to each other, relatively, two lengths may be whose order decides what the next step is. Rounding changes
+/// lengths of steps by up to 4e-3.
+const TIE: f64 = 0.03;
+/// By how much of itself an end and a first step are shortened.
+const SHORTER: f64 = 1.0 / 32.0;
+
+/// An adaptive launch in which nothing near a tie decides the length of a step: else one side might make a step more.
+/// It begins with a shorter step and ends earlier, if need be.
+pub(super) fn without_ties<T: Evolves>(mut launch: Run<f64>, method: &Method, n: usize) -> Result<Run<f64>> {
+    let mut work = Team::new(blocks(n)?);
+    loop {
+        let mut run: Run<T> = launch.convert();
+        let mut tied = false;
+        // The first length is given.
+        evolve(&mut run, method, &mut work, 1);
+        while run.counters.is_running() && !tied {
+            let (p, progress) = (&run.parameters, &run.report.progress);
+            let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
+            let [of_left, aim] = [progress.next / left, progress.aim / progress.next].map(T::to_f64);
+            let decisions = [(of_left, 1.0), (of_left, 0.5), (aim, 1.0), (aim, pace::NEAREST_AIM)];
+            tied = decisions.into_iter().any(|(length, bound)| (length / bound - 1.0).abs() < TIE);
+            evolve(&mut run, method, &mut work, 1);
+        }
+        if !tied {
+            return Ok(launch);
+        }
+        let p = &mut launch.parameters;
+        let ticks = Ticks { unit: p.time_unit, tick: p.time_tick };
+        p.clock_end = (p.end_high + p.end_low) * (1.0 - SHORTER);
+        (p.end_high, p.end_low) = ticks.split(p.clock_end);
+        (p.goal_high, p.goal_low) = (p.end_high, p.end_low);
+        launch.report.progress.next *= 1.0 - SHORTER;
+    }
 }
 
 /// The leverage of the error of a step of this order after which the next one is `growth` times as long: that length
