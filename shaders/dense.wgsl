@@ -1,7 +1,6 @@
 // What lies inside an adaptive step: a polynomial through both of its ends. Twin of crates/flow/src/scheme/dense.rs.
 
 const RESOLVED = 131072.0;
-const RESOLVED_SHORT = 8192.0;
 const BISECTIONS = 54u;
 const EARLY_LOOK = 0.0625;
 const LATE_LOOK = 0.9375;
@@ -124,7 +123,7 @@ fn fall_of(h: real, decline: vec2<real>) -> Fall {
         let ratio = h / report.progress.taken;
         arc = Arc(Jet(0.0, ratio * report.progress.slope, ratio * ratio * report.progress.bend), end);
     }
-    let resolved = real(select(RESOLVED, RESOLVED_SHORT, IS_SHORT) * EPSILON) <= after;
+    let resolved = is_by_polygon() || real(RESOLVED * EPSILON) <= after;
     return Fall(select(EXPONENTIAL, SMOOTH, resolved && arc_is_tame(arc)), fallen, arc);
 }
 

@@ -282,7 +282,7 @@ fn aim_at_relaxation() {
     let relax_at = all_parameters[member].relax_at;
     let excess = report.now.excess;
     report.progress.aim = 0.0;
-    let resolved = real(RESOLVED * EPSILON) <= abs(excess * report.progress.slope);
+    let resolved = is_by_polygon() || real(RESOLVED * EPSILON) <= abs(excess * report.progress.slope);
     let is_ahead = all_counters[member].relax_step == NEVER && !(excess <= relax_at) && !(relax_at <= real(0.0));
     if is_ahead && (resolved || IS_SHORT) {
         var slope = report.progress.slope;

@@ -123,9 +123,20 @@ fn gaps_of_attempt() -> LargestGaps {
     ));
     if !GEOMETRIC { return LargestGaps(fields, vec(0.0)); }
     settle();
-    let own = max(bounded_abs(load_field(NODE_GAPS)), bounded_abs(load_field(NODE_GAPS + 1u)));
-    let lower = max(bounded_abs(load_field(NODE_GAPS + 2u)), bounded_abs(load_field(NODE_GAPS + 3u)));
-    return LargestGaps(fields, ring_maxima(vec(block_max(own), block_max(lower), 0.0, 0.0)));
+    var nodes = vec();
+    if IS_SHORT {
+        let count = real(max(owns, 1u));
+        let means = bounded_abs(vec(
+            block_sum(load_field(NODE_GAPS)), block_sum(load_field(NODE_GAPS + 1u)),
+            block_sum(load_field(NODE_GAPS + 2u)), block_sum(load_field(NODE_GAPS + 3u)),
+        ) / count);
+        nodes = vec(max(means.x, means.y), max(means.z, means.w), 0.0, 0.0);
+    } else {
+        let own = max(bounded_abs(load_field(NODE_GAPS)), bounded_abs(load_field(NODE_GAPS + 1u)));
+        let lower = max(bounded_abs(load_field(NODE_GAPS + 2u)), bounded_abs(load_field(NODE_GAPS + 3u)));
+        nodes = vec(block_max(own), block_max(lower), 0.0, 0.0);
+    }
+    return LargestGaps(fields, ring_maxima(nodes));
 }
 
 /// The tolerance of a step whose solves are refined, or the rounding of its parts if that is larger.

@@ -45,11 +45,6 @@ fn twice_sin_atan(v: vec) -> vec {
     return real(2.0) * (t / sqrt(vec(1.0) + t * t));
 }
 
-/// A number without all but its leading eight binary digits, if numbers are short.
-fn coarse(value: real) -> real {
-    return real(bitcast<f32>(bitcast<u32>(f32(value)) & 0xffff0000u));
-}
-
 /// ln(b/a) of positive numbers; WGSL has no logarithm in f64.
 fn ln_ratio(a: real, b: real) -> real {
     var q = b / a;

@@ -8,10 +8,17 @@ const MIN_EDGE = 1e-5;
 const MAX_DRIFT = 1.0;
 /// Gap between k and the polygon's turn above which no member counts as relaxed.
 const MAX_GAP = 0.5;
+/// Terms of the series of a root of unity after the first.
+const ROOT_TERMS = 5u;
 /// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below it.
 const NEAR = 4.0;
 /// The place of 4π, or 4|W|, in the law.
 const QUOTIENT = 22u;
+
+/// Whether the excess and its derivatives are computed by the regular polygon next to the curve.
+fn is_by_polygon() -> bool {
+    return IS_SHORT && !CRYSTAL;
+}
 
 /// Sums of the new curve: length, area, energy, turning. Of a crystal, in place of the energy the sum of gamma |e|.
 var<private> sums: vec;
@@ -80,30 +87,156 @@ fn quotient(length: real, area: real) -> real {
     return length * length / (all_parameters[member].law[QUOTIENT] * abs(area));
 }
 
-/// The regular polygon that the sums of a curve are compared with, node by node: its edge, m² times the leading digits
-/// of the apothem of edge 1, and by how much the whole exceeds that, as a share.
-struct Regular { edge: real, cross: real, rest: real }
+/// The regular polygon next to the new curve, with which it is compared node by node where numbers are short: its
+/// centre c, the factor G of ωⁱ in its nodes and that in its unit tangents, the length of its edges, its area.
+struct Regular { centre: vec2<real>, radius: vec2<real>, tangent: vec2<real>, edge: real, area: real }
+var<private> regular: Regular;
 
-/// The polygon with about this length; none where numbers are long.
-fn regular_near(length: real) -> Regular {
-    let edge = coarse(length / real(NODES));
-    return Regular(edge, edge * edge * real(APOTHEM), real(APOTHEM_REST));
+fn regular_near(x: vec, y: vec) -> Regular {
+    let unit = root();
+    let turned_back = vec(block_sum(x * unit.x + y * unit.y), block_sum(y * unit.x - x * unit.y), 0.0, 0.0);
+    let all = ring_sums(vec(block_sum(x), block_sum(y), turned_back.xy)) / real(NODES);
+    let size = sqrt(all.z * all.z + all.w * all.w);
+    var along = vec2<real>(1.0, 0.0);
+    if !(size <= real(0.0)) { along = all.zw / size; }
+    let cosine = real(HALF_COSINE);
+    let sine = real(HALF_SINE);
+    let tangent = vec2(along.x * sine - along.y * cosine, along.x * cosine + along.y * sine);
+    return Regular(all.xy, all.zw, tangent, (sine + sine) * size, real(NODES) * (sine * cosine) * (size * size));
 }
 
-/// The distance from equilibrium by the sums over what edges and `x_{i-1} × x_i` exceed those of the polygon by.
-fn excess(regular: Regular, longer: real, more: real) -> real {
-    let plain = quotient(total_tension(), sums.y) - all_parameters[member].polygon_ratio;
-    if !IS_SHORT || CRYSTAL { return plain; }
-    let by = longer / (real(NODES) * regular.edge);
-    let by_area = more / (real(NODES) * regular.cross);
-    let whole = real(1.0) + by;
-    let over = (by + by) + by * by + regular.rest * (whole * whole) - by_area;
-    let value = all_parameters[member].polygon_ratio * (over / (real(1.0) + by_area));
-    return select(value, plain, sums.y <= real(0.0));
+/// L', L'', 2A' and 2A'' in units of a length that grows as the polygon would.
+fn regular_changes() -> vec {
+    let unit = root();
+    let nodes = turned(regular.radius, unit);
+    let tangents = turned(regular.tangent, unit);
+    var slope_x = load_field(SLOPE_BEFORE);
+    var slope_y = load_field(SLOPE_BEFORE + 1u);
+    var bend_x = load_field(BEND_BEFORE);
+    var bend_y = load_field(BEND_BEFORE + 1u);
+    let slopes = windows(slope_x, slope_y);
+    settle();
+    let bends = windows(bend_x, bend_y);
+    let radius = regular.radius;
+    let outwards = vec(
+        block_sum(slope_x * nodes.x + slope_y * nodes.y), block_sum(bend_x * nodes.x + bend_y * nodes.y), 0.0, 0.0,
+    );
+    let growth = ring_sums(outwards).xy / (real(NODES) * (radius.x * radius.x + radius.y * radius.y));
+    let ex = rises_of_places(new_x).here;
+    let ey = rises_of_places(new_y).here;
+    let fx = relative(ex, rises(slopes.a).here, growth);
+    let fy = relative(ey, rises(slopes.b).here, growth);
+    let gx = relative_bend(ex, fx, rises(bends.a).here, growth);
+    let gy = relative_bend(ey, fy, rises(bends.b).here, growth);
+    let x = coordinate(here(new_x)) - vec(regular.centre.x);
+    let y = coordinate(here(new_y)) - vec(regular.centre.y);
+    let ux = relative(x, slope_x, growth);
+    let uy = relative(y, slope_y, growth);
+    let sx = relative_bend(x, ux, bend_x, growth);
+    let sy = relative_bend(y, uy, bend_y, growth);
+    let inverse = vec(1.0) / sqrt(ex * ex + ey * ey);
+    // The unit vector along the edge, and by how much it differs from the polygon's.
+    let nx = ex * inverse;
+    let ny = ey * inverse;
+    let cx = nx - tangents.x;
+    let cy = ny - tangents.y;
+    let dx = x - nodes.x;
+    let dy = y - nodes.y;
+    let wx = ex - regular.edge * tangents.x;
+    let wy = ey - regular.edge * tangents.y;
+    let across = nx * fy - ny * fx;
+    let stretch = cx * fx + cy * fy;
+    let bent = across * across * inverse + (cx * gx + cy * gy);
+    let area = (dx * fy - dy * fx) + (ux * wy - uy * wx);
+    let area_bend = (dx * gy - dy * gx) + (sx * wy - sy * wx) + real(2.0) * (ux * fy - uy * fx);
+    settle();
+    return ring_sums(vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend)));
+}
+
+/// By how much the length of an edge exceeds its own part along the polygon's, and `d_{i-1} × d_i` of the differences d
+/// from the polygon's nodes; in long numbers the length of the edge and `x_{i-1} × x_i`.
+struct Exceeded { longer: vec, more: vec }
+
+fn exceeded(wx: Window, wy: Window, own: Edge) -> Exceeded {
+    if !IS_SHORT { return Exceeded(own.length, cross(wx, wy)); }
+    let unit = root();
+    let tangents = turned(regular.tangent, unit);
+    let nodes = turned(regular.radius, unit);
+    let along = tangents.x * own.x + tangents.y * own.y;
+    let across = tangents.x * own.y - tangents.y * own.x;
+    let longer = select(across * across / (own.length + along), own.length - along, along <= vec(0.0));
+    let dx = coordinate(here(wx)) - vec(regular.centre.x) - nodes.x;
+    let dy = coordinate(here(wy)) - vec(regular.centre.y) - nodes.y;
+    let more = dx * (own.y - regular.edge * tangents.y) - dy * (own.x - regular.edge * tangents.x);
+    return Exceeded(longer, more);
+}
+
+/// The distance from equilibrium by the sums of that.
+fn excess(longer: real, more: real) -> real {
+    let p = &all_parameters[member];
+    let plain = quotient(total_tension(), sums.y) - p.polygon_ratio;
+    if !is_by_polygon() { return plain; }
+    let own = real(NODES) * regular.edge;
+    let unit = p.law[QUOTIENT];
+    let over = longer * (own + own + longer) - p.polygon_ratio * unit * (real(0.5) * more);
+    return select(over / (unit * sums.y), plain, sums.y <= real(0.0));
+}
+
+/// The first derivative of a place or an edge in units of a length that grows at these two derivatives.
+fn relative(at: vec, slope: vec, growth: vec2<real>) -> vec {
+    return slope - growth.x * at;
+}
+
+/// The second, by the first.
+fn relative_bend(at: vec, slope: vec, bend: vec, growth: vec2<real>) -> vec {
+    return bend - growth.y * at - real(2.0) * growth.x * slope;
+}
+
+/// `z w` of complex numbers.
+fn turned(z: vec2<real>, w: Complex) -> Complex {
+    return Complex(z.x * w.x - z.y * w.y, z.x * w.y + z.y * w.x);
+}
+
+/// ωⁱ, an n-th root of unity, at the nodes: by the nearest quarter of a turn, which is at most π/4 away.
+fn root() -> Complex {
+    let i = vec4(first) + vec4(0u, 1u, 2u, 3u);
+    let quarter = (8u * i + NODES) / (2u * NODES);
+    let past = vec4<i32>(4u * i) - vec4<i32>(quarter * NODES);
+    let angle = real(1.5707963267948966) / real(NODES) * vec(past);
+    let square = angle * angle;
+    var sine = vec(1.0);
+    var cosine = vec(1.0);
+    for (var left = ROOT_TERMS; left > 0u; left--) {
+        let factor = real(2u * left);
+        sine = vec(1.0) - square / (factor * (factor + real(1.0))) * sine;
+        cosine = vec(1.0) - square / (factor * (factor - real(1.0))) * cosine;
+    }
+    sine = angle * sine;
+    let is_odd = (quarter & vec4(1u)) != vec4(0u);
+    let is_opposite = (quarter & vec4(2u)) != vec4(0u);
+    let x = select(cosine, -sine, is_odd);
+    let y = select(sine, cosine, is_odd);
+    return Complex(select(x, -x, is_opposite), select(y, -y, is_opposite));
 }
 
 /// The first and the second derivative of ln excess along an adaptive step, by those of the nodes of the new curve.
 fn decline() -> vec2<real> {
+    var all = vec();
+    if is_by_polygon() { all = regular_changes(); } else { all = changes(); }
+    let length = total_tension();
+    let half = real(0.5);
+    let growth = all.x / length;
+    let widening = half * all.z / sums.y;
+    let slope_of_ratio = real(2.0) * growth - widening;
+    let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
+        - (half * all.w / sums.y - widening * widening);
+    let over = quotient(length, sums.y) / distance;
+    let falls = over * slope_of_ratio;
+    return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
+}
+
+/// L', L'', 2A' and 2A''. Of a crystal, `γ|e|` stands for the length of an edge.
+fn changes() -> vec {
     let slope = windows(load_field(SLOPE_BEFORE), load_field(SLOPE_BEFORE + 1u));
     settle();
     let bend = windows(load_field(BEND_BEFORE), load_field(BEND_BEFORE + 1u));
@@ -131,18 +264,7 @@ fn decline() -> vec2<real> {
     let area_bend = (minus1(bend.a) * at.y - here(bend.a) * at.before_y)
         + (at.before_x * here(bend.b) - at.x * minus1(bend.b))
         + real(2.0) * (minus1(slope.a) * here(slope.b) - here(slope.a) * minus1(slope.b));
-    let part = vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend));
-    let all = ring_sums(part);
-    let length = total_tension();
-    let half = real(0.5);
-    let growth = all.x / length;
-    let widening = half * all.z / sums.y;
-    let slope_of_ratio = real(2.0) * growth - widening;
-    let bend_of_ratio = real(2.0) * (all.y / length - growth * growth)
-        - (half * all.w / sums.y - widening * widening);
-    let over = quotient(length, sums.y) / distance;
-    let falls = over * slope_of_ratio;
-    return vec2(falls, over * (bend_of_ratio + slope_of_ratio * slope_of_ratio) - falls * falls);
+    return ring_sums(vec(block_sum(stretch), block_sum(bent), block_sum(area), block_sum(area_bend)));
 }
 
 /// The largest difference between the angle by which the new curvature turns the tangent over a segment and the angle
@@ -179,14 +301,12 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
         }
     }
     let turning = winding(x.here, y.here, x.plus1, y.plus1);
-    var regular = Regular();
     if IS_SHORT {
         settle();
-        regular = regular_near(ring_sums(vec(block_sum(own), 0.0, 0.0, 0.0)).x);
+        regular = regular_near(coordinate(here(wx)), coordinate(here(wy)));
     }
-    let longer = own - vec(regular.edge);
-    let more = cross(wx, wy) - vec(regular.cross);
-    let part = vec(block_sum(longer), block_sum(more), block_sum(energy), block_sum(turning));
+    let over = exceeded(wx, wy, edge(x.here, y.here));
+    let part = vec(block_sum(over.longer), block_sum(over.more), block_sum(energy), block_sum(turning));
     let shortest = -bounded_abs(own);
     let extremes_of_block = vec(
         block_max(bounded_abs(kh * rh)),
@@ -197,15 +317,11 @@ fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
     let others_of_block = vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0);
     settle();
     let all = ring_summary(part, extremes_of_block, others_of_block);
-    sums = vec(all.sums.x, real(0.5) * all.sums.y, all.sums.zw);
-    if IS_SHORT {
-        let nodes = real(NODES);
-        sums.x = nodes * regular.edge + all.sums.x;
-        sums.y = real(0.5) * (nodes * regular.cross + all.sums.y);
-    }
+    let length = real(NODES) * regular.edge + all.sums.x;
+    sums = vec(length, regular.area + real(0.5) * all.sums.y, all.sums.zw);
     extremes = all.extremes;
     others = all.others;
-    distance = excess(regular, all.sums.x, all.sums.y);
+    distance = excess(all.sums.x, all.sums.y);
 }
 
 /// Derives the observables from the last `observe`.

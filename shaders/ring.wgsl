@@ -18,9 +18,9 @@ override BLOCKS: u32;
 /// Threads: at least one per block, in whole subgroups.
 override THREADS: u32;
 
-/// The leading digits of 1/(2 tan(π/n)), and the rest as a share of them.
-override APOTHEM: f32;
-override APOTHEM_REST: f32;
+/// The cosine and the sine of π/n.
+override HALF_COSINE: f32;
+override HALF_SINE: f32;
 
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;

@@ -309,7 +309,7 @@ fn a_curve_that_is_not_simple_is_never_called_relaxed() {
 
 #[test]
 fn a_threshold_in_the_rounding_of_the_excess_gives_no_relaxation_time() {
-    let flags = "--shape circle:1 --amplitude 0.002 --modes 2..=4 --t-end 0.6 --curves 4 --solver direct";
+    let flags = "--shape circle:1 --amplitude 0.0005 --modes 2..=4 --t-end 0.6 --curves 4 --solver direct";
     let single = run(&format!("{flags} --precision f32"));
     for row in single.summary() {
         assert_eq!((&*row["status"], &*row["t_relax"]), ("unfinished", ""), "excess {}", row["excess_start"]);

@@ -54,22 +54,26 @@ fn limits_in_f32_are_those_in_f64_within_their_errors() {
     let home = TempDir::new().unwrap();
     let curves =
         "run --accurate --shape ellipse:choice(1.05,8),1 --amplitude 0.02 --modes 2..=5 --backend cpu --points 240";
-    let [single, double] = ["f32", "f64"].map(|precision| {
-        done(home.path(), &format!("{curves} --curves 6 --precision {precision} --out {precision}"));
-        rows(&home.path().join(precision).join("summary.csv"))
-    });
+    let lobes = "run --accurate --shape flower:4:0.15 --amplitude 0.05 --backend cpu --points 128";
     let mut farthest = 0.0_f64;
-    for (single, double) in single.iter().zip(&double) {
-        let off = number::<f64>(single, "t_limit") - number::<f64>(double, "t_limit");
-        let [error, exact] = [single, double].map(|row| number::<f64>(row, "t_error"));
-        assert!(off.abs() < error && error < 1e-2 * number::<f64>(single, "t_limit"), "{single:?} {double:?}");
-        farthest = farthest.max(off.abs() / exact);
+    for (place, spec) in [curves, lobes].into_iter().enumerate() {
+        let [single, double] = ["f32", "f64"].map(|precision| {
+            let out = format!("{precision}-{place}");
+            done(home.path(), &format!("{spec} --curves 6 --precision {precision} --out {out}"));
+            rows(&home.path().join(out).join("summary.csv"))
+        });
+        for (single, double) in single.iter().zip(&double) {
+            let off = number::<f64>(single, "t_limit") - number::<f64>(double, "t_limit");
+            let [error, exact] = [single, double].map(|row| number::<f64>(row, "t_error"));
+            assert!(off.abs() < error && error < 2e-3 * number::<f64>(single, "t_limit"), "{single:?} {double:?}");
+            farthest = farthest.max(off.abs() / exact);
+        }
     }
     // The control: errors that know nothing of rounding.
     println!("{farthest} errors of f64");
-    assert!(farthest > 1.0);
+    assert!(farthest > 2.0);
     // Beyond the nodes of f32 members continue in f64.
-    let numbers: BTreeSet<(bool, String)> = rows(&home.path().join("f32/levels.csv"))
+    let numbers: BTreeSet<(bool, String)> = rows(&home.path().join("f32-0/levels.csv"))
         .iter()
         .map(|row| (number::<u64>(row, "points") > 320, row["precision"].clone()))
         .collect();

@@ -201,8 +201,6 @@ pub trait Real:
     fn to_f64(self) -> f64;
     /// Rounds down to an integer.
     fn floor(self) -> Self;
-    /// The number without all but its leading eight binary digits if it has 24.
-    fn coarse(self) -> Self;
 }
 
 /// The number type of the state and of all arithmetic on it.
@@ -251,7 +249,7 @@ impl Precision {
 }
 
 macro_rules! real {
-    ($type:ident, $precision:ident, $name:literal, $mantissa:expr, $bias:expr, $whole:expr, $fine:expr) => {
+    ($type:ident, $precision:ident, $name:literal, $mantissa:expr, $bias:expr, $whole:expr) => {
         impl Number for $type {
             type Real = $type;
             type Mask = bool;
@@ -311,15 +309,12 @@ macro_rules! real {
             fn floor(self) -> Self {
                 <$type>::floor(self)
             }
-            fn coarse(self) -> Self {
-                <$type>::from_bits(self.to_bits() & !$fine)
-            }
         }
     };
 }
 
-real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0, 0);
-real!(f32, F32, "f32", 23, 127, 12_582_912.0, 0xffff);
+real!(f64, F64, "f64", 52, 1023, 6_755_399_441_055_744.0);
+real!(f32, F32, "f32", 23, 127, 12_582_912.0);
 
 /// Maximum number of halvings that bring a ratio near 1.
 pub const LN_HALVINGS: u32 = 64;

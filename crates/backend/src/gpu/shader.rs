@@ -2,7 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
-    scheme::observe::apothem,
+    scheme::observe::half_angle,
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -152,10 +152,10 @@ pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
 
 /// Returns the `override` constants that size the kernel.
 pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
-    let [apothem, rest] = apothem(blocks.n);
+    let [cosine, sine] = half_angle(blocks.n);
     [
-        ("APOTHEM", apothem),
-        ("APOTHEM_REST", rest),
+        ("HALF_COSINE", cosine),
+        ("HALF_SINE", sine),
         ("NODES", blocks.n as f64),
         ("FOURS", blocks.fours as f64),
         ("BLOCKS", blocks.count() as f64),

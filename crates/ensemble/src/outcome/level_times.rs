@@ -6,9 +6,9 @@ use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
 
-/// Errors of a time in f32: of its steps, relative, and of the excess, in units of ε.
-const OF_STEPS: f64 = 3e-4;
-const OF_EXCESS: f64 = 0.1;
+/// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
+const OF_STEPS: f64 = 5e-5;
+const OF_NODES: f64 = 8.0;
 
 /// The relaxation times of members at all levels.
 #[derive(Clone, Debug, Default)]
@@ -204,10 +204,11 @@ fn turn(spec: &Spec, at: &AtLevel) -> f64 {
     if spec.refine { spec.turns() * at.turn } else { at.turn }
 }
 
-/// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit).
+/// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit). The root
+/// of the excess is about the amplitude.
 fn rounding(precision: Precision, excess: f64) -> f64 {
     match precision {
-        Precision::F32 => OF_STEPS.hypot(OF_EXCESS * precision.epsilon() / excess),
+        Precision::F32 => OF_STEPS.hypot(OF_NODES * precision.epsilon() / excess.sqrt()),
         Precision::F64 => 0.0,
     }
 }

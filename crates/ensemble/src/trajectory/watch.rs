@@ -13,8 +13,9 @@ use curvelax_flow::{
 pub(super) const ROUND: f64 = 1e-13;
 /// An excess is a difference of numbers near 1: a threshold below this multiple of ε is within its rounding.
 const RESOLUTION: f64 = 128.0;
-/// The same where it is that of a regular polygon, in f32, which is right to half an ε.
-const RESOLUTION_SHORT: f64 = 8.0;
+/// The same in f32, where it is computed by the differences from a regular polygon: there the nodes are rounded by some
+/// 1/300 of the amplitude of the shape.
+const RESOLUTION_SHORT: f64 = 1.0;
 
 /// An excess below which a threshold lies in the rounding of the precision.
 pub(super) fn resolution(precision: Precision, is_crystal: bool) -> f64 {

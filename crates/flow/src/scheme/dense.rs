@@ -9,9 +9,6 @@ use crate::number::{
 /// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand
 /// times, and the excess is a small difference of numbers near 1.
 pub const RESOLVED: f64 = 131_072.0;
-/// The same inside steps in short numbers, whose excess is not that difference. Lengths of steps do not follow from
-/// such derivatives: two machines would make other ones.
-pub const RESOLVED_SHORT: f64 = 8192.0;
 /// Number of halvings that find the place of an event: beyond the precision of every number.
 pub const BISECTIONS: u32 = 54;
 
@@ -210,8 +207,15 @@ pub(super) enum Fall<T> {
 }
 
 impl<T: Real> Fall<T> {
-    /// The fall in an adaptive step of length h from `before` to `after`, with the derivatives of ln excess at its end.
-    pub(super) fn of(progress: &Progress<T>, h: T, [before, after]: [T; 2], [slope, bend]: [T; 2]) -> Fall<T> {
+    /// The fall in an adaptive step of length h from `before` to `after`, with the derivatives of ln excess at its end,
+    /// which are `exact` or a small difference.
+    pub(super) fn of(
+        progress: &Progress<T>,
+        h: T,
+        [before, after]: [T; 2],
+        [slope, bend]: [T; 2],
+        exact: bool,
+    ) -> Fall<T> {
         let zero = T::of(0.0);
         if before.le(zero) || after.le(zero) {
             return Fall::Straight;
@@ -224,8 +228,7 @@ impl<T: Real> Fall<T> {
             let ratio = h / progress.taken;
             Arc { start: Jet::scaled(zero, progress.slope, progress.bend, ratio), end }
         };
-        let multiple = if T::IS_SHORT { RESOLVED_SHORT } else { RESOLVED };
-        let resolved = T::of(multiple * T::EPSILON).le(after);
+        let resolved = exact || T::of(RESOLVED * T::EPSILON).le(after);
         if resolved && arc.is_tame() { Fall::Smooth(arc) } else { Fall::Exponential(fallen) }
     }
 }

@@ -213,13 +213,13 @@ impl<N: Number> Team<N> {
         let seen = observe::glance(&state.curve, &work.new, parameters, branches.law, work.blocks);
         if branches.adaptive {
             let followed = self.excess.le(parameters.follow_to).not();
+            let (gaps, blocks) = (&state.gaps, work.blocks);
             errors =
-                extrapolation::errors_of_attempt(&state.gaps, &work.new, seen.length, followed, parameters, branches);
+                extrapolation::errors_of_attempt(gaps, &work.new, seen.length, followed, parameters, branches, blocks);
         }
-        let sizes = [seen.tension, seen.area, seen.excess];
         if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
-            decline = observe::decline(&work.new, slope, bend, sizes, parameters, branches.law, work.blocks);
+            decline = observe::decline(&work.new, slope, bend, &seen, parameters, branches.law, work.blocks);
         }
         Attempt { stepped, errors, decline, seen }
     }
@@ -459,7 +459,8 @@ fn taken<T: Real>(
         return Taken { h: T::of(0.0), before, after, fall: Fall::Straight, gap };
     }
     let h = stride.length;
-    Taken { h, before, after, fall: Fall::of(&run.report.progress, h, [before, after], decline), gap }
+    let exact = observe::is_by_polygon::<T>(run.parameters.kind_of_law());
+    Taken { h, before, after, fall: Fall::of(&run.report.progress, h, [before, after], decline, exact), gap }
 }
 
 #[inline(always)]
@@ -556,7 +557,8 @@ fn aim_at_relaxation<T: Real>(run: &mut Run<T>, before: T, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
-    let resolved = T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
+    let by_polygon = observe::is_by_polygon::<T>(p.kind_of_law());
+    let resolved = by_polygon || T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
     let is_ahead = counters.relax_step == NEVER && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0));
     if is_ahead && (resolved || T::IS_SHORT) {
         let [slope, bend] =

@@ -21,7 +21,7 @@ use super::{
 };
 use crate::{
     number::{BIG, Number, Real},
-    solver::Ring,
+    solver::{Blocks, Ring},
 };
 
 /// Lowest order of a step.
@@ -233,7 +233,9 @@ pub fn tolerance<N: Number>(p: &Parameters<N>) -> N {
 /// is relative to the geometric mean of the largest |k| and the spread of k: a curve close to a circle must not lose
 /// its modes in a tolerance measured by the circle.
 ///
-/// In the geometric form the error of the nodes counts, too: relative to the radius and in the same proportion.
+/// In the geometric form the error of the nodes counts, too: relative to the radius and in the same proportion. In
+/// short numbers that of a block of nodes is their mean: modes that vary within it show in the curvature, and the
+/// rounding of places, which NODE_WEIGHT multiplies, differs from node to node.
 #[inline(always)]
 pub fn errors_of_attempt<N: Number>(
     gaps: &Gaps<N>,
@@ -242,6 +244,7 @@ pub fn errors_of_attempt<N: Number>(
     followed: N::Mask,
     p: &Parameters<N>,
     branches: Branches,
+    blocks: Blocks,
 ) -> [N; 2] {
     let low = N::of(-2.0 * BIG);
     let (mut gap_k, mut gap_r, mut lower_k, mut lower_r) = (N::of(0.0), N::of(0.0), N::of(0.0), N::of(0.0));
@@ -269,8 +272,18 @@ pub fn errors_of_attempt<N: Number>(
     let unit = length * (scale / size) * N::of(0.5 / std::f64::consts::PI / NODE_WEIGHT);
     let largest = |of: &[Ring<N>; 2]| {
         let mut largest = N::of(0.0);
-        for i in 0..new.len() {
-            largest = largest.max(of[0][i].bounded_abs().max(of[1][i].bounded_abs()));
+        for (first, count) in blocks.iter() {
+            let mut sums = [N::of(0.0); 2];
+            for i in first..first + count {
+                if N::IS_SHORT {
+                    sums[0] += of[0][i];
+                    sums[1] += of[1][i];
+                } else {
+                    largest = largest.max(of[0][i].bounded_abs().max(of[1][i].bounded_abs()));
+                }
+            }
+            let [x, y] = sums.map(|sum| (sum / N::of(count as f64)).bounded_abs());
+            largest = largest.max(x.max(y));
         }
         (largest / unit).bounded_abs()
     };

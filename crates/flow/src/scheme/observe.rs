@@ -32,9 +32,17 @@ pub const MAX_DRIFT: f64 = 1.0;
 /// Gap between k and the polygon's turn, in rad, above which no member counts as relaxed: the curvature, which moves
 /// the member, is not that of the polygon, which looks round.
 pub const MAX_GAP: f64 = 0.5;
+/// Terms of the series of a root of unity after the first, enough for f32.
+pub const ROOT_TERMS: u32 = 5;
 /// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below the
 /// threshold inside the step.
 pub const NEAR: f64 = 4.0;
+
+/// Whether the excess of a curve under this law, and its derivatives, are computed by the [`Regular`] polygon next to
+/// it: no differences of numbers near 1, whose rounding would be more than they are.
+pub fn is_by_polygon<N: Number>(kind: Kind) -> bool {
+    N::IS_SHORT && !kind.is_crystal()
+}
 
 /// The sums, the first four in the order of the kernel's `vec4`.
 #[derive(Clone, Copy, Debug)]
@@ -92,6 +100,8 @@ pub struct Glance<N> {
     pub minus_k_min: N,
     /// Largest displacement of a node from the old curve.
     pub farthest: N,
+    /// The regular polygon next to the curve.
+    pub regular: Regular<N>,
 }
 
 /// Examines the curve that a step made from `old`.
@@ -117,7 +127,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
     let tension = tension(new, length, &p.law(kind), blocks);
     let excess = regular.excess([longer, more], [tension, area], p, kind);
     let farthest = farthest.sqrt();
-    Glance { length, tension, area, excess, turning, turn, slack, minus_shortest, minus_k_min, farthest }
+    Glance { length, tension, area, excess, turning, turn, slack, minus_shortest, minus_k_min, farthest, regular }
 }
 
 impl<N: Number> Glance<N> {
@@ -221,86 +231,179 @@ fn quotient<N: Number>(tension: N, area: N, p: &Parameters<N>) -> N {
     tension * tension / (p.law[QUOTIENT] * area.abs())
 }
 
-/// The regular polygon that the sums of a curve in f32 are compared with, node by node: the length and the area of a
+/// The regular polygon next to a curve in f32, with which it is compared node by node: the length and the area of a
 /// curve that is nearly a circle say nothing of its excess once they are rounded.
 ///
-/// With edges m and `C = m²/(2 tan(π/n))` at each node its quotient is just [`Parameters::polygon_ratio`]. So with the
-/// mean of `(|e_i| - m)/m`, λ, and that of `(x_{i-1} × x_i - C)/C`, σ, the excess is that times `((1 + λ)² - (1 +
-/// σ))/(1 + σ)`.
+/// Its nodes are `c + G ωⁱ`, with ω = exp(2πi/n), the mean c of the nodes and `G = Σ x_j ω^{-j}/n`. So what is of first
+/// order in the differences from it cancels, in length and in area: with its unit tangents T, edges E and the
+/// differences `d_i = x_i - c - G ωⁱ` the length exceeds its own by `Σ |e_i| - T_i·e_i`, the area by `½ Σ d_{i-1} ×
+/// d_i`, whatever the curve. Both are of second order, and rounding is a share of them.
 #[derive(Clone, Copy, Debug)]
-struct Regular<N> {
+pub struct Regular<N> {
     nodes: N,
-    /// m, of few digits; 0 in f64.
+    /// c.
+    centre: [N; 2],
+    /// G.
+    radius: [N; 2],
+    /// The factor of ωⁱ in `T_i`.
+    tangent: [N; 2],
+    /// |E|; 0 in f64.
     edge: N,
-    /// m² and the leading digits of `1/(2 tan(π/n))`, whose product is exact.
-    cross: N,
-    /// By how much the whole C exceeds it, as a share.
-    rest: N,
+    /// Area.
+    area: N,
 }
 
 impl<N: Number> Regular<N> {
-    /// The polygon with about the length of `curve`.
+    /// The polygon next to `curve`.
     #[inline(always)]
     fn near(curve: &Curve<N>, blocks: Blocks) -> Regular<N> {
         let (n, zero) = (curve.len(), N::of(0.0));
         let nodes = N::of(n as f64);
         if !N::IS_SHORT {
-            return Regular { nodes, edge: zero, cross: zero, rest: zero };
+            let none = [zero; 2];
+            return Regular { nodes, centre: none, radius: none, tangent: none, edge: zero, area: zero };
         }
         let mut sums = solver::Sums::new(blocks);
         for i in 0..n {
-            sums.add(i, [edge(curve, i)[2]]);
+            let ([x, y], [c, s]) = ([curve.x[i], curve.y[i]].map(coordinate), root(i, n));
+            sums.add(i, [x, y, x * c + y * s, y * c - x * s]);
         }
-        let [length] = sums.totals();
-        let [leading, rest] = apothem(n);
-        let edge = coarse(length / nodes);
-        Regular { nodes, edge, cross: edge * edge * N::of(leading), rest: N::of(rest) }
+        let [x, y, re, im] = sums.totals().map(|sum| sum / nodes);
+        let [cosine, sine] = half_angle(n).map(N::of);
+        let size = (re * re + im * im).sqrt();
+        let none = size.le(zero);
+        let inverse = N::select(none, zero, size.recip());
+        let [tx, ty] = [N::select(none, N::of(1.0), re * inverse), im * inverse];
+        Regular {
+            nodes,
+            centre: [x, y],
+            radius: [re, im],
+            tangent: [tx * sine - ty * cosine, tx * cosine + ty * sine],
+            edge: (sine + sine) * size,
+            area: nodes * (sine * cosine) * (size * size),
+        }
     }
 
-    /// By how much edge i, and `x_{i-1} × x_i`, exceed its own.
+    /// [`changes`] of the curve in units of a length that grows as the polygon would, relative to which it neither
+    /// grows nor shrinks: what is of first order cancels here, too, and the quotient has no unit.
+    #[inline(always)]
+    fn changes(&self, curve: &Curve<N>, slope: &Curve<N>, bend: &Curve<N>, blocks: Blocks) -> [N; 4] {
+        let n = curve.len();
+        let mut sums = solver::Sums::new(blocks);
+        for i in 0..n {
+            let [px, py] = turned(self.radius, root(i, n));
+            sums.add(i, [slope.x[i] * px + slope.y[i] * py, bend.x[i] * px + bend.y[i] * py]);
+        }
+        let [re, im] = self.radius;
+        let growth = sums.totals().map(|sum| sum / (self.nodes * (re * re + im * im)));
+        let mut sums = solver::Sums::new(blocks);
+        for i in 0..n {
+            let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
+            let [fx, fy] = [relative(ex, slope.x.rises(i)[1], growth), relative(ey, slope.y.rises(i)[1], growth)];
+            let gx = relative_bend(ex, fx, bend.x.rises(i)[1], growth);
+            let gy = relative_bend(ey, fy, bend.y.rises(i)[1], growth);
+            let (x, y) = (coordinate(curve.x[i]) - self.centre[0], coordinate(curve.y[i]) - self.centre[1]);
+            let [ux, uy] = [relative(x, slope.x[i], growth), relative(y, slope.y[i], growth)];
+            let [sx, sy] = [relative_bend(x, ux, bend.x[i], growth), relative_bend(y, uy, bend.y[i], growth)];
+            let root = root(i, n);
+            let ([tx, ty], [px, py]) = (turned(self.tangent, root), turned(self.radius, root));
+            let inverse = (ex * ex + ey * ey).sqrt().recip();
+            // The unit vector along the edge, and by how much it differs from T.
+            let (nx, ny) = (ex * inverse, ey * inverse);
+            let ([cx, cy], [dx, dy]) = ([nx - tx, ny - ty], [x - px, y - py]);
+            let (wx, wy) = (ex - self.edge * tx, ey - self.edge * ty);
+            let across = nx * fy - ny * fx;
+            let stretch = cx * fx + cy * fy;
+            let bent = across * across * inverse + (cx * gx + cy * gy);
+            let area = (dx * fy - dy * fx) + (ux * wy - uy * wx);
+            let area_bend = (dx * gy - dy * gx) + (sx * wy - sy * wx) + N::of(2.0) * (ux * fy - uy * fx);
+            sums.add(i, [stretch, bent, area, area_bend]);
+        }
+        sums.totals()
+    }
+
+    /// By how much the length of edge i exceeds its own part along T, and `d_{i-1} × d_i`; in f64 the length of the
+    /// edge and `x_{i-1} × x_i`.
     #[inline(always)]
     fn exceeded(&self, curve: &Curve<N>, i: usize) -> [N; 2] {
-        [edge(curve, i)[2] - self.edge, cross(curve, i) - self.cross]
+        let [ex, ey, e] = edge(curve, i);
+        if !N::IS_SHORT {
+            return [e, cross(curve, i)];
+        }
+        let root = root(i, curve.len());
+        let [tx, ty] = turned(self.tangent, root);
+        let (along, across) = (tx * ex + ty * ey, tx * ey - ty * ex);
+        let longer = N::select(along.le(N::of(0.0)), e - along, across * across / (e + along));
+        let [px, py] = turned(self.radius, root);
+        let dx = coordinate(curve.x[i]) - self.centre[0] - px;
+        let dy = coordinate(curve.y[i]) - self.centre[1] - py;
+        [longer, dx * (ey - self.edge * ty) - dy * (ex - self.edge * tx)]
     }
 
     /// Length and area, by the sums of that.
     #[inline(always)]
     fn sizes(&self, [longer, more]: [N; 2]) -> [N; 2] {
-        if !N::IS_SHORT {
-            return [longer, N::of(0.5) * more];
-        }
-        [self.nodes * self.edge + longer, N::of(0.5) * (self.nodes * self.cross + more)]
+        [self.nodes * self.edge + longer, self.area + N::of(0.5) * more]
     }
 
     /// The distance from equilibrium: the quotient minus that of the polygon at equilibrium.
     #[inline(always)]
     fn excess(&self, [longer, more]: [N; 2], [tension, area]: [N; 2], p: &Parameters<N>, kind: Kind) -> N {
         let plain = quotient(tension, area, p) - p.polygon_ratio;
-        if !N::IS_SHORT || kind.is_crystal() {
+        if !is_by_polygon::<N>(kind) {
             return plain;
         }
-        let (one, longer, more) = (N::of(1.0), longer / (self.nodes * self.edge), more / (self.nodes * self.cross));
-        let whole = one + longer;
-        let over = (longer + longer) + longer * longer + self.rest * (whole * whole) - more;
-        // Of a curve that runs clockwise, or round next to nothing, there is no such polygon.
-        N::select(area.le(N::of(0.0)), plain, p.polygon_ratio * (over / (one + more)))
+        let (own, unit) = (self.nodes * self.edge, p.law[QUOTIENT]);
+        let over = longer * (own + own + longer) - p.polygon_ratio * unit * (N::of(0.5) * more);
+        // Of a curve that runs clockwise the area counts by its size.
+        N::select(area.le(N::of(0.0)), plain, over / (unit * area))
     }
 }
 
-/// The leading digits of `1/(2 tan(π/n))` and the rest, as a share of them.
-pub fn apothem(n: usize) -> [f64; 2] {
-    let whole = 0.5 / (std::f64::consts::PI / n as f64).tan();
-    let leading = (whole as f32).coarse().to_f64();
-    [leading, (whole - leading) / leading]
-}
-
-/// The leading [digits](Real::coarse) of a number.
+/// The first derivative of a place or an edge in units of a length that grows at these two derivatives.
 #[inline(always)]
-fn coarse<N: Number>(mut value: N) -> N {
-    for lane in 0..N::LANES {
-        value.set_lane(lane, value.lane(lane).coarse());
+fn relative<N: Number>(at: N, slope: N, [growth, _]: [N; 2]) -> N {
+    slope - growth * at
+}
+
+/// The second, by the first.
+#[inline(always)]
+fn relative_bend<N: Number>(at: N, slope: N, bend: N, [growth, growth_bend]: [N; 2]) -> N {
+    bend - growth_bend * at - N::of(2.0) * growth * slope
+}
+
+/// The cosine and the sine of π/n.
+pub fn half_angle(n: usize) -> [f64; 2] {
+    let angle = std::f64::consts::PI / n as f64;
+    [angle.cos(), angle.sin()]
+}
+
+/// `z w` of complex numbers.
+#[inline(always)]
+fn turned<N: Number>([x, y]: [N; 2], [c, s]: [N; 2]) -> [N; 2] {
+    [x * c - y * s, x * s + y * c]
+}
+
+/// ωⁱ, an n-th root of unity, for 0 ≤ i < n: by the nearest quarter of a turn, which is at most π/4 away.
+#[inline(always)]
+fn root<N: Number>(i: usize, n: usize) -> [N; 2] {
+    let quarter = (8 * i + n) / (2 * n);
+    let past = (4 * i) as f64 - (quarter * n) as f64;
+    let angle = std::f64::consts::FRAC_PI_2 / n as f64 * past;
+    let square = angle * angle;
+    let (mut sine, mut cosine) = (1.0, 1.0);
+    for factor in (1..=ROOT_TERMS).rev().map(|term| f64::from(2 * term)) {
+        sine = 1.0 - square / (factor * (factor + 1.0)) * sine;
+        cosine = 1.0 - square / (factor * (factor - 1.0)) * cosine;
     }
-    value
+    let sine = angle * sine;
+    let at = match quarter % 4 {
+        0 => [cosine, sine],
+        1 => [-sine, cosine],
+        2 => [-cosine, -sine],
+        _ => [sine, -cosine],
+    };
+    at.map(N::of)
 }
 
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
@@ -312,12 +415,28 @@ pub fn decline<N: Number>(
     curve: &Curve<N>,
     slope: &Curve<N>,
     bend: &Curve<N>,
-    [tension, area, excess]: [N; 3],
+    seen: &Glance<N>,
     p: &Parameters<N>,
     kind: Kind,
     blocks: Blocks,
 ) -> [N; 2] {
-    let (two, law) = (N::of(2.0), p.law(kind));
+    let [stretch, bent, area_slope, area_bend] = if is_by_polygon::<N>(kind) {
+        seen.regular.changes(curve, slope, bend, blocks)
+    } else {
+        changes(curve, slope, bend, &p.law(kind), blocks)
+    };
+    let (two, half) = (N::of(2.0), N::of(0.5));
+    let (growth, widening) = (stretch / seen.tension, half * area_slope / seen.area);
+    let slope = two * growth - widening;
+    let bend = two * (bent / seen.tension - growth * growth) - (half * area_bend / seen.area - widening * widening);
+    let over = quotient(seen.tension, seen.area, p) / seen.excess;
+    let first = over * slope;
+    [first, over * (bend + slope * slope) - first * first]
+}
+
+/// L', L'', 2A' and 2A''.
+#[inline(always)]
+fn changes<N: Number>(curve: &Curve<N>, slope: &Curve<N>, bend: &Curve<N>, law: &Law<N>, blocks: Blocks) -> [N; 4] {
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
         let [xm, x, ym, y] = corner(curve, i);
@@ -327,7 +446,7 @@ pub fn decline<N: Number>(
         let ([_, fx, ..], [_, fy, ..]) = (slope.x.rises(i), slope.y.rises(i));
         let ([_, gx, ..], [_, gy, ..]) = (bend.x.rises(i), bend.y.rises(i));
         let inverse = (ex * ex + ey * ey).sqrt().recip();
-        let (stretch, bent) = if kind.is_crystal() {
+        let (stretch, bent) = if law.kind.is_crystal() {
             let [tx, ty] = [ex * inverse, ey * inverse];
             let [gamma, turned, stiffness] = law.tension([tx, ty]);
             let across = tx * fy - ty * fx;
@@ -339,17 +458,10 @@ pub fn decline<N: Number>(
             (stretch, (fx * fx + fy * fy + (ex * gx + ey * gy) - stretch * stretch) * inverse)
         };
         let area = (um * y - u * ym) + (xm * v - x * vm);
-        let area_bend = (sm * y - s * ym) + (xm * t - x * tm) + two * (um * v - u * vm);
+        let area_bend = (sm * y - s * ym) + (xm * t - x * tm) + N::of(2.0) * (um * v - u * vm);
         sums.add(i, [stretch, bent, area, area_bend]);
     }
-    let [stretch, bent, area_slope, area_bend] = sums.totals();
-    let half = N::of(0.5);
-    let (growth, widening) = (stretch / tension, half * area_slope / area);
-    let slope = two * growth - widening;
-    let bend = two * (bent / tension - growth * growth) - (half * area_bend / area - widening * widening);
-    let over = quotient(tension, area, p) / excess;
-    let first = over * slope;
-    [first, over * (bend + slope * slope) - first * first]
+    sums.totals()
 }
 
 /// The largest difference between the angle by which the curvature turns the tangent over a segment, from middle to
