@@ -33,20 +33,25 @@ fn ellipse(n: usize, a: f64) -> Vec<DVec2> {
     (0..n).map(node).collect()
 }
 
-/// t_relax to 1 % of the excess at the start, by steps of a tolerance of 1e-4 up to the highest order of f32.
-fn t_relax<T: Evolves>(nodes: &[DVec2], flow: &str, geometric: bool) -> f64 {
-    let (n, level) = (nodes.len(), |level: f64| Observed::from_numbers(&[level; Observed::<f64>::FIELDS.len()]));
-    let mut p = Parameters {
-        adaptive: 1e-4,
-        geometric: f64::from(u8::from(geometric)),
+/// Adaptive steps of this tolerance up to a late time.
+fn parameters(n: usize, flow: &Flow, adaptive: f64) -> Parameters<f64> {
+    Parameters {
+        adaptive,
         polygon_ratio: n as f64 / PI * (PI / n as f64).tan(),
         time_unit: 2f64.powi(-10),
         time_tick: 2f64.powi(-34),
         end_high: 64.0,
         goal_high: 64.0,
         clock_end: 64.0,
-        ..Parameters::of_flow(&flow.parse::<Flow>().unwrap(), 0.0)
-    };
+        ..Parameters::of_flow(flow, 0.0)
+    }
+}
+
+/// t_relax to 1 % of the excess at the start, by steps of a tolerance of 1e-4 up to the highest order of f32.
+fn t_relax<T: Evolves>(nodes: &[DVec2], flow: &str, geometric: bool) -> f64 {
+    let (n, level) = (nodes.len(), |level: f64| Observed::from_numbers(&[level; Observed::<f64>::FIELDS.len()]));
+    let mut p =
+        Parameters { geometric: f64::from(u8::from(geometric)), ..parameters(n, &flow.parse::<Flow>().unwrap(), 1e-4) };
     p.set_levels(&level(-1e18), &level(1e18));
     let start = Run::new(State::<f64>::from_nodes(nodes), p).report.now.excess;
     (p.relax_at, p.half_at, p.follow_to) = (0.01 * start, 0.5 * start, 0.01 * start);
@@ -67,16 +72,7 @@ fn t_relax<T: Evolves>(nodes: &[DVec2], flow: &str, geometric: bool) -> f64 {
 /// length and area alone, which are rounded.
 fn slopes<T: Evolves>(nodes: &[DVec2]) -> [f64; 2] {
     let n = nodes.len();
-    let p = Parameters {
-        adaptive: 1.0,
-        polygon_ratio: n as f64 / PI * (PI / n as f64).tan(),
-        time_unit: 2f64.powi(-10),
-        time_tick: 2f64.powi(-34),
-        end_high: 64.0,
-        goal_high: 64.0,
-        clock_end: 64.0,
-        ..Parameters::of_flow(&Flow::SurfaceDiffusion, 0.0)
-    };
+    let p = parameters(n, &Flow::SurfaceDiffusion, 1.0);
     let mut run: Run<T> = Run::new(State::from_nodes(nodes), p.convert());
     let start = run.report.now;
     run.report.progress.next = T::of(2f64.powi(-8));
