@@ -33,6 +33,7 @@ files! {
     OBSERVE "observe.wgsl",
     PACE "pace.wgsl",
     PLACE "place.wgsl",
+    PLACE_FIXED "place_fixed.wgsl",
     POSITION "position.wgsl",
     PULL "pull.wgsl",
     REDISTRIBUTION "redistribution.wgsl",

@@ -9,7 +9,7 @@ use curvelax::{
     ensemble::Status,
     flow::{DIFFUSIVITY_WAVES, ENERGY_UNIT, ENERGY_WAVES, LAW, LENGTH_PENALTY, QUOTIENT},
     forcing::{CONSERVED, DRIVE, FEEDBACK, FEEDBACK_AREA, KEPT_AREA, KEPT_LENGTH},
-    number::{BIG, LN_HALVINGS, LN_TERMS, Real},
+    number::{BIG, LN_HALVINGS, LN_TERMS, Real, place},
     scheme::{
         decay, dense, extrapolation,
         forcing::{DAMPING, ROUNDS},
@@ -44,9 +44,14 @@ fn capabilities<T: Real>() -> Capabilities {
 }
 
 /// Parses and validates a source; an error names the shader's own file and line.
-fn validated(source: &str, variant: Variant, capabilities: Capabilities) -> Result<(Module, ModuleInfo), String> {
-    let at =
-        |line: usize| shader::locate(line, variant).map_or(String::new(), |(file, line)| format!("{file}:{line}: "));
+fn validated<T: Real>(
+    source: &str,
+    variant: Variant,
+    capabilities: Capabilities,
+) -> Result<(Module, ModuleInfo), String> {
+    let at = |line: usize| {
+        shader::locate::<T>(line, variant).map_or(String::new(), |(file, line)| format!("{file}:{line}: "))
+    };
     let module = naga::front::wgsl::parse_str(source).map_err(|error| {
         let line = error.location(source).map_or(0, |location| location.line_number as usize);
         format!("{}{}", at(line), error.message())
@@ -62,7 +67,7 @@ fn validated(source: &str, variant: Variant, capabilities: Capabilities) -> Resu
 
 /// The module with its sizes filled in for rings of `n` nodes.
 fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
-    let (module, info) = validated(&shader::source::<T>(variant), variant, capabilities::<T>()).unwrap();
+    let (module, info) = validated::<T>(&shader::source::<T>(variant), variant, capabilities::<T>()).unwrap();
     let constants = shader::constants(Blocks::new(n).unwrap(), 32);
     let constants = constants.iter().map(|(name, value)| (name.to_string(), *value)).collect();
     let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, None, &constants).unwrap();
@@ -72,17 +77,17 @@ fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
 #[test]
 fn every_shader_is_valid_in_both_precisions() {
     for variant in Variant::all() {
-        validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
-        validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
+        validated::<f32>(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
+        validated::<f64>(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
     }
     // Negative control: f64 is refused unless requested.
-    assert!(validated(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
+    assert!(validated::<f64>(&shader::source::<f64>(SWEEPS), SWEEPS, Capabilities::empty()).is_err());
 }
 
 #[test]
 fn an_error_names_the_shader_file_and_line() {
     let source = shader::source::<f32>(SWEEPS).replacen("fn pull() {", "fn pull() { nonsense;", 1);
-    let message = validated(&source, SWEEPS, Capabilities::empty()).unwrap_err();
+    let message = validated::<f32>(&source, SWEEPS, Capabilities::empty()).unwrap_err();
     let line = include_str!("../../shaders/pull.wgsl").lines().position(|line| line == "fn pull() {").unwrap() + 1;
     assert!(message.starts_with(&format!("pull.wgsl:{line}:")), "{message}");
 }
@@ -90,7 +95,7 @@ fn an_error_names_the_shader_file_and_line() {
 #[test]
 fn every_file_in_the_folder_is_part_of_the_kernel() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/shaders");
-    let source = all_sources::<f32>();
+    let source = all_sources::<f32>() + &all_sources::<f64>();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         if path.extension().is_some_and(|extension| extension == "wgsl") {
@@ -139,7 +144,7 @@ fn structs(module: &Module) -> BTreeMap<String, (Vec<(String, u32)>, u32)> {
 }
 
 fn layouts_agree<T: Real>() {
-    let (module, _) = validated(&shader::source::<T>(SWEEPS), SWEEPS, capabilities::<T>()).unwrap();
+    let (module, _) = validated::<T>(&shader::source::<T>(SWEEPS), SWEEPS, capabilities::<T>()).unwrap();
     let found = structs(&module);
     let number = size_of::<T>() as u32;
     let expect = |name: &str, fields: &[&str], step: u32| {
@@ -184,7 +189,7 @@ fn the_structs_shared_with_the_host_have_its_layout() {
 #[test]
 fn bindings_are_found_by_name_where_the_host_puts_them() {
     for variant in Variant::all() {
-        let (module, _) = validated(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
+        let (module, _) = validated::<f32>(&shader::source::<f32>(variant), variant, capabilities::<f32>()).unwrap();
         let mut bound = BTreeMap::new();
         for (_, variable) in module.global_variables.iter() {
             if let Some(binding) = &variable.binding {
@@ -221,7 +226,7 @@ fn workgroup_memory_is_what_the_host_counts() {
 
 /// The text of all shaders without comments.
 fn code() -> String {
-    let source = all_sources::<f64>();
+    let source = all_sources::<f64>() + &all_sources::<f32>();
     source.lines().map(|line| line.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n")
 }
 
@@ -263,7 +268,7 @@ fn transcendental(module: &Module) -> Option<naga::MathFunction> {
 #[test]
 fn no_transcendental_function_is_used() {
     for variant in Variant::all() {
-        let (module, _) = validated(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
+        let (module, _) = validated::<f64>(&shader::source::<f64>(variant), variant, capabilities::<f64>()).unwrap();
         assert_eq!(transcendental(&module), None);
     }
     // Negative control.
@@ -294,7 +299,7 @@ fn constant(name: &str) -> f64 {
     let mut lines = code.lines().filter(|line| line.starts_with(&start));
     let line = lines.next().unwrap_or_else(|| panic!("no constant {name}"));
     assert!(lines.all(|other| other == line), "{name} has several values");
-    let text = line[start.len()..].trim_end_matches(';').trim_end_matches('u');
+    let text = line[start.len()..].trim_end_matches(';').trim_end_matches(['u', 'i']);
     text.strip_prefix("0x")
         .map_or_else(|| text.parse().unwrap(), |hex| f64::from(u32::from_str_radix(hex, 16).unwrap()))
 }
@@ -303,6 +308,12 @@ fn constant(name: &str) -> f64 {
 fn the_constants_of_shaders_and_host_are_equal() {
     let table = [
         ("BIG", BIG),
+        ("ORIGIN", f64::from(place::ORIGIN)),
+        ("RIM", f64::from(place::RIM)),
+        ("PER_UNIT", place::PER_UNIT.into()),
+        ("STEP", place::STEP.into()),
+        ("FARTHEST", place::FARTHEST.into()),
+        ("BEYOND", place::BEYOND),
         ("MAX_TURN", MAX_TURN),
         ("MIN_EDGE", MIN_EDGE),
         ("MAX_DRIFT", MAX_DRIFT),

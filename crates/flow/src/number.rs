@@ -11,6 +11,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 mod lanes;
 pub mod place;
 
+use place::{Place, SinglePlace};
+
 pub use lanes::{Element, Instructions, WithLanes, with_lanes};
 
 /// Values above this bound count as not finite; far below the overflow of `f32`, so that squares do not overflow.
@@ -78,6 +80,7 @@ pub trait Number:
     + Send
     + Sync
     + 'static
+    + Place
     + Add<Output = Self>
     + AddAssign
     + Sub<Output = Self>
@@ -191,7 +194,7 @@ const EXP_SERIES: [f64; 14] = [
 
 /// A single number that can be copied to and from a device.
 pub trait Real:
-    Number<Real = Self, Mask = bool> + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug
+    Number<Real = Self, Mask = bool> + SinglePlace + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug
 {
     /// Its name in WGSL.
     const NAME: &'static str;

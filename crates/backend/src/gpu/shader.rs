@@ -55,18 +55,20 @@ impl Variant {
         Variant { solver, adaptive, watched, geometric, crystal, forced, traced: false, subgroup: false }
     }
 
-    /// Returns the files of the kernel, in the order of the step.
-    pub fn parts(self) -> impl Iterator<Item = ShaderPart> {
+    /// Returns the files of the kernel in precision `T`, in the order of the step.
+    pub fn parts<T: Real>(self) -> impl Iterator<Item = ShaderPart> {
+        let place = if T::IS_SHORT { PLACE_FIXED } else { PLACE };
         let solver = of_solver(self.solver);
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
         let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
-        COMMON.into_iter().chain(exchange).chain(solver.iter().copied()).chain(trace)
+        BEFORE.into_iter().chain(place).chain(COMMON).chain(exchange).chain(solver.iter().copied()).chain(trace)
     }
 }
 
-const COMMON: [ShaderPart; 21] = [
-    shaders::NUMBER,
-    shaders::PLACE,
+const BEFORE: [ShaderPart; 1] = [shaders::NUMBER];
+const PLACE: [ShaderPart; 1] = [shaders::PLACE];
+const PLACE_FIXED: [ShaderPart; 1] = [shaders::PLACE_FIXED];
+const COMMON: [ShaderPart; 19] = [
     shaders::RING,
     shaders::SUMS,
     shaders::MEMBER,
@@ -109,17 +111,17 @@ pub fn source<T: Real>(variant: Variant) -> String {
          const ADAPTIVE = {adaptive}; const SWEEPS = {sweeps}; const WATCHED = {watched}; \
          const GEOMETRIC = {geometric}; const CRYSTAL = {crystal}; const FORCED = {forced};\n"
     );
-    for (_, part) in variant.parts() {
+    for (_, part) in variant.parts::<T>() {
         text.push_str(part);
         text.push('\n');
     }
     text
 }
 
-/// Returns the file and line, within `shaders/`, of a line (from 1) of [`source`].
-pub fn locate(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
+/// Returns the file and line, within `shaders/`, of a line (from 1) of [`source`] in precision `T`.
+pub fn locate<T: Real>(line: usize, variant: Variant) -> Option<(&'static str, usize)> {
     let mut before = 1;
-    for (file, part) in variant.parts() {
+    for (file, part) in variant.parts::<T>() {
         let lines = part.lines().count() + 1;
         if line > before && line <= before + lines {
             return Some((file, line - before));
@@ -180,16 +182,21 @@ pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
 mod tests {
     use super::*;
 
-    #[test]
-    fn a_line_of_the_source_is_found_in_its_file() {
+    fn lines_are_found_in<T: Real>() {
         for variant in Variant::all().into_iter().flat_map(|own| [own, Variant { watched: true, ..own }]) {
-            let text = source::<f64>(variant);
+            let text = source::<T>(variant);
             for (number, line) in text.lines().enumerate().skip(1).filter(|(_, line)| !line.is_empty()) {
-                let (file, at) = locate(number + 1, variant).unwrap();
-                let (_, part) = variant.parts().find(|part| part.0 == file).unwrap();
+                let (file, at) = locate::<T>(number + 1, variant).unwrap();
+                let (_, part) = variant.parts::<T>().find(|part| part.0 == file).unwrap();
                 assert_eq!(part.lines().nth(at - 1), Some(line), "{file}:{at}");
             }
         }
-        assert_eq!(locate(1, Variant::of(Solver::GaussSeidel)), None);
+        assert_eq!(locate::<T>(1, Variant::of(Solver::GaussSeidel)), None);
+    }
+
+    #[test]
+    fn a_line_of_the_source_is_found_in_its_file() {
+        lines_are_found_in::<f32>();
+        lines_are_found_in::<f64>();
     }
 }

@@ -9,10 +9,10 @@ use std::{
     ops::{Add, AddAssign, Div, Mul, Neg, Sub},
 };
 
-use bytemuck::cast;
+use bytemuck::{cast, cast_slice, cast_slice_mut};
 use pulp::Simd;
 
-use super::{Mask, Number, Real};
+use super::{Mask, Number, Real, place::Place};
 
 /// Vector instructions whose token is available anywhere.
 pub trait Instructions: Simd {
@@ -272,6 +272,48 @@ impl<S: Instructions, T: Element<S>, const R: usize> Neg for Lanes<S, T, R> {
     }
 }
 
+/// Places of f64 in vector instructions of its own; those of f32 lane by lane, which compilers make instructions of.
+impl<S: Instructions, T: Element<S>, const R: usize> Place for Lanes<S, T, R> {
+    #[inline(always)]
+    fn apart(mut from: Self, to: Self) -> Self {
+        if !Self::IS_SHORT {
+            return to - from;
+        }
+        for (from, to) in cast_slice_mut::<_, T>(&mut from.0).iter_mut().zip(cast_slice(&to.0)) {
+            *from = T::apart(*from, *to);
+        }
+        from
+    }
+    #[inline(always)]
+    fn moved(mut place: Self, by: Self) -> Self {
+        if !Self::IS_SHORT {
+            return place + by;
+        }
+        for (place, by) in cast_slice_mut::<_, T>(&mut place.0).iter_mut().zip(cast_slice(&by.0)) {
+            *place = T::moved(*place, *by);
+        }
+        place
+    }
+    #[inline(always)]
+    fn coordinate(mut place: Self) -> Self {
+        if Self::IS_SHORT {
+            for place in cast_slice_mut::<_, T>(&mut place.0) {
+                *place = T::coordinate(*place);
+            }
+        }
+        place
+    }
+    #[inline(always)]
+    fn placed(mut at: Self) -> Self {
+        if Self::IS_SHORT {
+            for at in cast_slice_mut::<_, T>(&mut at.0) {
+                *at = T::placed(*at);
+            }
+        }
+        at
+    }
+}
+
 impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     type Real = T;
     type Mask = LaneMask<S, T, R>;
@@ -285,11 +327,11 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn lane(&self, lane: usize) -> T {
-        bytemuck::cast_slice::<_, T>(&self.0)[lane]
+        cast_slice::<_, T>(&self.0)[lane]
     }
     #[inline(always)]
     fn set_lane(&mut self, lane: usize, value: T) {
-        bytemuck::cast_slice_mut::<_, T>(&mut self.0)[lane] = value;
+        cast_slice_mut::<_, T>(&mut self.0)[lane] = value;
     }
     #[inline(always)]
     fn sqrt(self) -> Self {
@@ -309,7 +351,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Number for Lanes<S, T, R> {
     }
     #[inline(always)]
     fn exp2_integral(mut self) -> Self {
-        for value in bytemuck::cast_slice_mut::<_, T>(&mut self.0) {
+        for value in cast_slice_mut::<_, T>(&mut self.0) {
             *value = value.exp2_integral();
         }
         self
@@ -397,6 +439,10 @@ mod tests {
                     same("abs", a.abs(), x.abs());
                     same("sqrt", a.sqrt(), x.sqrt());
                     same("of", N::of(0.1), T::of(0.1));
+                    same("apart", N::apart(a, b), T::apart(x, y));
+                    same("moved", N::moved(a, b), T::moved(x, y));
+                    same("coordinate", N::coordinate(a), T::coordinate(x));
+                    same("placed", N::placed(a), T::placed(x));
                     same("select", N::select(below, a, b), if x <= y { x } else { y });
                     // Neither accepts NaN, nor distinguishes zeros.
                     if x <= y || y <= x {

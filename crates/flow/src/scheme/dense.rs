@@ -1,10 +1,7 @@
 //! What lies inside an adaptive step: a polynomial through both of its ends. Twin of `shaders/dense.wgsl`.
 
 use super::{Curve, State, member::Progress, state::is_of_places};
-use crate::number::{
-    BIG, Number, Real, ln_ratio,
-    place::{coordinate, placed},
-};
+use crate::number::{BIG, Number, Real, ln_ratio};
 
 /// Multiple of ε below which the derivatives of ln excess are mostly rounding: their weights amplify it a thousand
 /// times, and the excess is a small difference of numbers near 1.
@@ -167,14 +164,14 @@ impl<N: Number> Arc<N> {
             let is_place = is_of_places(field);
             let (((x0, u0), s0), ((x1, u1), s1)) = (start, end);
             for i in 0..x0.len() {
-                let [from, end] = if is_place { [coordinate(x0[i]), coordinate(x1[i])] } else { [x0[i], x1[i]] };
+                let [from, end] = if is_place { [N::coordinate(x0[i]), N::coordinate(x1[i])] } else { [x0[i], x1[i]] };
                 let inside = a.value * from
                     + a.slope * u0[i]
                     + a.bend * s0[i]
                     + b.value * end
                     + b.slope * u1[i]
                     + b.bend * s1[i];
-                to[i] = if is_place { placed(inside) } else { inside };
+                to[i] = if is_place { N::placed(inside) } else { inside };
             }
             to.close();
         }

@@ -27,7 +27,7 @@ use super::{
 };
 use crate::{
     forcing::{DRIVE, FEEDBACK, FEEDBACK_AREA, KEPT_AREA, KEPT_LENGTH},
-    number::{Number, place},
+    number::Number,
     solver::{Blocks, Ring, Sums},
 };
 
@@ -110,8 +110,8 @@ pub fn push<N: Number>(
         let across = distance / (along_x * along_x + along_y * along_y).sqrt();
         by[0][i] = increments[0][i] - across * along_y;
         by[1][i] = increments[1][i] + across * along_x;
-        new.x[i] = place::moved(old.x[i], by[0][i]);
-        new.y[i] = place::moved(old.y[i], by[1][i]);
+        new.x[i] = N::moved(old.x[i], by[0][i]);
+        new.y[i] = N::moved(old.y[i], by[1][i]);
     }
     new.x.close();
     new.y.close();
@@ -153,8 +153,8 @@ pub fn correct<N: Number>(
         along = [along[0] + found[0], along[1] + found[1]];
         for i in 0..new.len() {
             let [ax, ay, lx, ly] = [&gradients[0], &gradients[1], &gradients[2], &gradients[3]].map(|ring| ring[i]);
-            new.x[i] = place::moved(old_x[i], by[0][i] + (along[0] * ax + along[1] * lx));
-            new.y[i] = place::moved(old_y[i], by[1][i] + (along[0] * ay + along[1] * ly));
+            new.x[i] = N::moved(old_x[i], by[0][i] + (along[0] * ax + along[1] * lx));
+            new.y[i] = N::moved(old_y[i], by[1][i] + (along[0] * ay + along[1] * ly));
         }
         new.x.close();
         new.y.close();

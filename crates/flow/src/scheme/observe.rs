@@ -15,10 +15,7 @@ use super::{
 };
 use crate::{
     flow::QUOTIENT,
-    number::{
-        BIG, Mask, Number, Real,
-        place::{apart, coordinate},
-    },
+    number::{BIG, Mask, Number, Real},
     solver::{self, Blocks},
 };
 
@@ -117,7 +114,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
         slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
         minus_shortest = minus_shortest.max(-e.bounded_abs());
         minus_k_min = minus_k_min.max(-k);
-        let (dx, dy) = (apart(old.x[i], new.x[i]), apart(old.y[i], new.y[i]));
+        let (dx, dy) = (N::apart(old.x[i], new.x[i]), N::apart(old.y[i], new.y[i]));
         farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
         let [longer, more] = regular.exceeded(new, i);
         sums.add(i, [longer, more, winding(new, i)]);
@@ -172,7 +169,7 @@ fn tension<N: Number>(curve: &Curve<N>, length: N, law: &Law<N>, blocks: Blocks)
 #[inline(always)]
 fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
     let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
-    [xm, x, ym, y].map(coordinate)
+    [xm, x, ym, y].map(N::coordinate)
 }
 
 /// `x_{i-1} × x_i`.
@@ -265,7 +262,7 @@ impl<N: Number> Regular<N> {
         }
         let mut sums = solver::Sums::new(blocks);
         for i in 0..n {
-            let ([x, y], [c, s]) = ([curve.x[i], curve.y[i]].map(coordinate), root(i, n));
+            let ([x, y], [c, s]) = ([curve.x[i], curve.y[i]].map(N::coordinate), root(i, n));
             sums.add(i, [x, y, x * c + y * s, y * c - x * s]);
         }
         let [x, y, re, im] = sums.totals().map(|sum| sum / nodes);
@@ -302,7 +299,7 @@ impl<N: Number> Regular<N> {
             let [fx, fy] = [relative(ex, slope.x.rises(i)[1], growth), relative(ey, slope.y.rises(i)[1], growth)];
             let gx = relative_bend(ex, fx, bend.x.rises(i)[1], growth);
             let gy = relative_bend(ey, fy, bend.y.rises(i)[1], growth);
-            let (x, y) = (coordinate(curve.x[i]) - self.centre[0], coordinate(curve.y[i]) - self.centre[1]);
+            let (x, y) = (N::coordinate(curve.x[i]) - self.centre[0], N::coordinate(curve.y[i]) - self.centre[1]);
             let [ux, uy] = [relative(x, slope.x[i], growth), relative(y, slope.y[i], growth)];
             let [sx, sy] = [relative_bend(x, ux, bend.x[i], growth), relative_bend(y, uy, bend.y[i], growth)];
             let root = root(i, n);
@@ -335,8 +332,8 @@ impl<N: Number> Regular<N> {
         let (along, across) = (tx * ex + ty * ey, tx * ey - ty * ex);
         let longer = N::select(along.le(N::of(0.0)), e - along, across * across / (e + along));
         let [px, py] = turned(self.radius, root);
-        let dx = coordinate(curve.x[i]) - self.centre[0] - px;
-        let dy = coordinate(curve.y[i]) - self.centre[1] - py;
+        let dx = N::coordinate(curve.x[i]) - self.centre[0] - px;
+        let dy = N::coordinate(curve.y[i]) - self.centre[1] - py;
         [longer, dx * (ey - self.edge * ty) - dy * (ex - self.edge * tx)]
     }
 

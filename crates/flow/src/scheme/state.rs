@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::law::Law;
 use crate::{
-    number::{Number, Real, place},
+    number::{Number, Real},
     solver::{Blocks, Memory, Ring, Solves, refinement::Remainder},
 };
 
@@ -145,7 +145,7 @@ impl<N: Number> Curve<N> {
 impl<T: Real> Curve<T> {
     /// Returns the nodes.
     pub fn positions(&self) -> impl Iterator<Item = DVec2> {
-        self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(place::to_f64(*x), place::to_f64(*y)))
+        self.x.nodes().iter().zip(self.y.nodes()).map(|(x, y)| DVec2::new(T::exact(*x), T::exact(*y)))
     }
 
     /// Creates the initial curve through the polygon `nodes` (n ≥ 6): `r_i = |R_i|` and
@@ -162,8 +162,8 @@ impl<T: Real> Curve<T> {
         };
         let ring = |value: &dyn Fn(usize) -> f64| Ring::from_nodes((0..n).map(|i| T::of(value(i))));
         Curve {
-            x: Ring::from_nodes(nodes.iter().map(|node| place::of_f64(node.x))),
-            y: Ring::from_nodes(nodes.iter().map(|node| place::of_f64(node.y))),
+            x: Ring::from_nodes(nodes.iter().map(|node| T::nearest(node.x))),
+            y: Ring::from_nodes(nodes.iter().map(|node| T::nearest(node.y))),
             k: ring(&|i| (vertex_angle(i + n - 1) + vertex_angle(i)) / (2.0 * edge(i).length())),
             r: ring(&|i| edge(i).length()),
         }
@@ -273,7 +273,7 @@ impl<T: Real> State<T> {
         let mut state = State::zeros(self.curve.len());
         for (field, (to, from)) in state.fields_mut().zip(self.fields()).enumerate() {
             let converted = |v: &T| match FIELDS_OF_PLACES.contains(&field) {
-                true => place::of_f64(place::to_f64(*v)),
+                true => U::nearest(T::exact(*v)),
                 false => U::of(v.to_f64()),
             };
             *to = Ring::from_nodes(from.nodes().iter().map(converted));
@@ -405,13 +405,13 @@ pub fn is_of_places(field: usize) -> bool {
 /// Returns an entry of this field of a curve after an increment.
 #[inline(always)]
 pub fn advanced<N: Number>(field: usize, old: N, increment: N) -> N {
-    if is_of_places(field) { place::moved(old, increment) } else { old + increment }
+    if is_of_places(field) { N::moved(old, increment) } else { old + increment }
 }
 
 /// Returns how an entry of this field of a curve has changed.
 #[inline(always)]
 pub fn change_from<N: Number>(field: usize, old: N, new: N) -> N {
-    if is_of_places(field) { place::apart(old, new) } else { new - old }
+    if is_of_places(field) { N::apart(old, new) } else { new - old }
 }
 
 /// Fills this field of a curve from that of an old one and the increments.

@@ -12,7 +12,7 @@
 
 use std::ops::{Index, IndexMut, Range};
 
-use crate::number::{Number, place::apart};
+use crate::number::Number;
 
 /// The largest block, and so the number of colours.
 pub const COLOURS: usize = 4;
@@ -181,7 +181,7 @@ impl<N: Number> Ring<N> {
     #[inline(always)]
     pub fn rises_of_places(&self, i: usize) -> [N; 4] {
         let [mm, m, x, p, pp] = self.window(i);
-        [apart(mm, m), apart(m, x), apart(x, p), apart(p, pp)]
+        [N::apart(mm, m), N::apart(m, x), N::apart(x, p), N::apart(p, pp)]
     }
 
     /// Returns by how much the square of the value at i+1 exceeds the one at i.
