@@ -218,7 +218,9 @@ fn refuse(next: real, least: real, cause: u32) {
 
 /// Refuses a step of length h that failed outright.
 fn refuse_failure(h: real, cause: u32) {
-    let least = select(real(MIN_STEP), real(MIN_TO_SINGULAR), cause == SINGULAR);
+    // In short numbers a curve that grows creeps towards the end of its coordinates.
+    let creeps = cause == SINGULAR || (IS_SHORT && cause == NONFINITE);
+    let least = select(real(MIN_STEP), real(MIN_TO_SINGULAR), creeps);
     refuse(real(AFTER_FAILURE) * h, least, cause);
 }
 

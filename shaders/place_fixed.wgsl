@@ -3,15 +3,18 @@
 
 /// The bits of the place at 0. All places are then normal numbers, which no device alters.
 const ORIGIN = 0x40000000i;
-/// Steps from there to the rim: 7.875 units. What would be beyond is at the rim, and the curve counts as not finite.
+/// Steps from there to the rim: 7.875 units. What would be beyond is at the rim.
 const RIM = 0x3f000000i;
+/// Steps from there to the first places whose coordinates count as not finite: 7.5 units. A curve that grows comes to
+/// them before it touches the rim.
+const OUTSIDE = 0x3c000000i;
 /// Steps in a unit.
 const PER_UNIT = 134217728.0;
 /// The length of a step.
 const STEP = 7.450580596923828e-9;
 /// Largest increment, in steps: the sum with a place is below 2³¹.
 const FARTHEST = 1073741824.0;
-/// The coordinate of places at the rim: its square is infinite.
+/// Their coordinate: its square is infinite.
 const BEYOND = 1e30;
 
 fn steps(place: vec) -> vec4<i32> {
@@ -37,7 +40,7 @@ fn moved(place: vec, by: vec) -> vec {
 /// The coordinate of a place.
 fn coordinate(place: vec) -> vec {
     let at = steps(place);
-    return select(vec(BEYOND), vec(at) * STEP, abs(at) < vec4(RIM));
+    return select(vec(BEYOND), vec(at) * STEP, abs(at) < vec4(OUTSIDE));
 }
 
 /// The place at a coordinate.

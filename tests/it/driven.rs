@@ -49,6 +49,26 @@ fn a_circle_that_does_not_vanish_in_time_is_unfinished_and_none_vanishes_without
 }
 
 #[test]
+fn a_circle_that_grows_in_f32_grows_as_in_f64_or_ends_where_its_coordinates_do() {
+    let grown = |flags: &str| {
+        let row = one(&format!("--shape circle:1 --drive -1 --relax-at 1e-12 {flags}"));
+        let grown = number(&row, "length_end") / number(&row, "length_start");
+        (row, grown)
+    };
+    for t in [2.0, 5.0, 20.0] {
+        let (row, grown) = grown(&format!("--precision f32 --t-end {t}"));
+        assert_eq!(number(&row, "t_end"), t);
+        assert!((grown / (1.0 + t) - 1.0).abs() < 1e-3, "t = {t}: {grown}");
+    }
+    // 16 times is made room for; beyond 60 units of a start whose radius is 1 to 2 there are no coordinates.
+    let (row, grown) = grown("--precision f32 --t-end 1000");
+    assert!(row["status"] == "nonfinite" && number(&row, "steps") < 2000.0, "{row:?}");
+    assert!((16.0..120.0).contains(&grown) && (grown / (1.0 + number(&row, "t_end")) - 1.0).abs() < 1e-3, "{grown}");
+    let (row, grown) = grown("--t-end 1000");
+    assert!(row["status"] != "nonfinite" && (grown / 1001.0 - 1.0).abs() < 1e-3, "{row:?}");
+}
+
+#[test]
 fn a_feedback_brings_the_area_to_its_own() {
     let (gain, target) = (1.0, 0.81 * PI);
     let row = one(&format!("--shape circle:1 --drive feedback:{gain},{target} --t-end 1 --relax-at 1e-12"));

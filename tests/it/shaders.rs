@@ -310,6 +310,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("BIG", BIG),
         ("ORIGIN", f64::from(place::ORIGIN)),
         ("RIM", f64::from(place::RIM)),
+        ("OUTSIDE", f64::from(place::OUTSIDE)),
         ("PER_UNIT", place::PER_UNIT.into()),
         ("STEP", place::STEP.into()),
         ("FARTHEST", place::FARTHEST.into()),

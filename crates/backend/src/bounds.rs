@@ -8,8 +8,8 @@ use curvelax_flow::{
     solver::Row as Coefficients,
 };
 
-/// Largest n at which f32 was verified against f64 (`docs/internals/conformance.md`).
-pub const MAX_POINTS_F32: usize = 320;
+/// Largest n at which f32 was verified against f64 (docs/internals/precision.md).
+pub const MAX_POINTS_F32: usize = 400;
 
 /// The unit of a bound: the size of the terms whose rounding the quantity inherits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

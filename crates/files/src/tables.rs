@@ -67,7 +67,7 @@ columns! { LevelRow:
     cell: whole = cell, "index of its cell";
     points: whole = points, "nodes";
     adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 with fixed steps";
-    precision: precision = precision, "number type: above 320 nodes f64 on the CPU where the run is in f32";
+    precision: precision = precision, "number type: above 400 nodes f64 on the CPU where the run is in f32";
     status: status = status, "how the member ended";
     t_relax: event = t_relax, "as in `summary.csv`";
     solves: whole = solves, "as in `summary.csv`";

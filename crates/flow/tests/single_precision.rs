@@ -103,22 +103,19 @@ fn errors(n: usize, geometric: bool, aspects: &[f64]) -> [f64; 2] {
 }
 
 #[test]
-fn times_in_f32_are_those_in_f64_up_to_320_nodes() {
-    for n in [100, 200, 320] {
-        for (geometric, bounds) in [(false, [1e-4, 3e-4]), (true, [2e-5, 1e-4])] {
-            let [median, worst] = errors(n, geometric, &[1.2, 2.0, 4.0]);
-            assert!(median < bounds[0] && worst < bounds[1], "n = {n}, geometric {geometric}: {median:e} {worst:e}");
-        }
+fn times_in_f32_are_those_in_f64_up_to_400_nodes() {
+    for (n, bounds) in [(100, [1e-5, 5e-5]), (200, [2e-5, 1e-4]), (320, [5e-5, 3e-4]), (400, [5e-5, 3e-4])] {
+        let [median, worst] = errors(n, true, &[1.05, 1.2, 2.0, 4.0]);
+        assert!(median < bounds[0] && worst < bounds[1], "n = {n}: {median:e} {worst:e}");
     }
 }
 
+/// In the paper's form k moves the nodes, and k has the digits of f32.
 #[test]
-fn weak_perturbations_relax_in_f32() {
-    for n in [100, 200] {
-        for geometric in [false, true] {
-            let [_, worst] = errors(n, geometric, &[1.05]);
-            assert!(worst < 1e-3, "n = {n}, geometric {geometric}: {worst:e}");
-        }
+fn times_in_the_paper_s_form_lose_more_where_nodes_are_many() {
+    for (n, bounds) in [(100, [1e-4, 3e-4]), (200, [1e-4, 1e-3]), (320, [1e-4, 1e-3]), (400, [3e-4, 2e-3])] {
+        let [median, worst] = errors(n, false, &[1.05, 1.2, 2.0, 4.0]);
+        assert!(median < bounds[0] && worst < bounds[1], "n = {n}: {median:e} {worst:e}");
     }
 }
 

@@ -37,18 +37,23 @@ const SHRUNK: f64 = 1e-3;
 const ERROR_PER_TOLERANCE: f64 = 1.0 / 12.0;
 /// Minimum number of clock ticks in the first adaptive step.
 const FIRST_TICKS: f64 = 16.0;
+/// Largest growth for which a member in f32 gets a larger unit: a start in it has as many digits as a number of f32.
+const MAX_GROWTH: f64 = 16.0;
 /// `--pull auto`: κ in units of the member's relaxation rate.
 const PULL_PER_RATE: f64 = 4.0;
 
 impl<'a> Trajectory<'a> {
     /// Creates a member at its start, and serves the output times that are due there.
     pub fn new(member: Member, spec: &Spec, precision: Precision, outputs: &'a Outputs) -> Trajectory<'a> {
-        let unit = unit_of(&member.nodes);
-        let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
-        let time_unit = unit.powi(4) / spec.mobility();
         let flow = member.flow.clone().unwrap_or_else(|| spec.typical().flow.into_owned());
         let forcing = member.forcing.unwrap_or_else(|| spec.typical().forcing);
         let forcing = forcing.kept_from([polygon::signed_area(&member.nodes), polygon::length(&member.nodes)]);
+        let mut unit = unit_of(&member.nodes);
+        if precision == Precision::F32 && !spec.stops_when_relaxed() {
+            unit *= growth(&flow, &forcing, radius(&member.nodes), spec.mobility() * spec.final_time());
+        }
+        let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
+        let time_unit = unit.powi(4) / spec.mobility();
         let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         let mut launch = Run::new(State::from_nodes(&nodes), parameters);
         launch.counters.order =
@@ -170,6 +175,21 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, time_unit: f64, precision: Pre
 /// The largest power of two not above the radius of the circle of the same length.
 fn unit_of(nodes: &[DVec2]) -> f64 {
     (polygon::length(nodes) / std::f64::consts::TAU).log2().floor().exp2()
+}
+
+/// The power of two by which a circle of this radius grows until `end`, at most [`MAX_GROWTH`]: coordinates in f32 end
+/// at 7.5 units.
+fn growth(flow: &Flow, forcing: &Forcing, radius: f64, end: f64) -> f64 {
+    let (mut grown, mut t) = (1.0, 0.0);
+    while grown < MAX_GROWTH {
+        let rate = forcing.growth(flow, grown * radius).max(forcing.growth(flow, 2.0 * grown * radius));
+        t += grown * radius / rate;
+        if !(rate > 0.0 && t < end) {
+            break;
+        }
+        grown *= 2.0;
+    }
+    grown
 }
 
 /// Whether the law, a rate or the fixed step of a member is outside the range of a precision: too large, or a step too

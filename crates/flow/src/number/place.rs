@@ -7,15 +7,18 @@
 
 /// The bits of the place at 0. All places are then normal numbers, which no device alters.
 pub const ORIGIN: i32 = 0x4000_0000;
-/// Steps from there to the rim: 7.875 units. What would be beyond is at the rim, and the curve counts as not finite.
+/// Steps from there to the rim: 7.875 units. What would be beyond is at the rim.
 pub const RIM: i32 = 0x3f00_0000;
+/// Steps from there to the first places whose coordinates count as not finite: 7.5 units. A curve that grows comes to
+/// them before it touches the rim.
+pub const OUTSIDE: i32 = 0x3c00_0000;
 /// Steps in a unit.
 pub const PER_UNIT: f32 = 134_217_728.0;
 /// The length of a step.
 pub const STEP: f32 = 1.0 / PER_UNIT;
 /// Largest increment, in steps: the sum with a place is below 2³¹.
 pub const FARTHEST: f32 = 1_073_741_824.0;
-/// The coordinate of places at the rim: its square is infinite.
+/// Their coordinate: its square is infinite.
 pub const BEYOND: f64 = 1e30;
 
 /// A number as a place, or the numbers of several lanes.
@@ -64,7 +67,7 @@ impl Place for f32 {
     #[inline(always)]
     fn coordinate(place: f32) -> f32 {
         let steps = steps(place);
-        if steps.wrapping_abs() < RIM { steps as f32 * STEP } else { BEYOND as f32 }
+        if steps.wrapping_abs() < OUTSIDE { steps as f32 * STEP } else { BEYOND as f32 }
     }
     #[inline(always)]
     fn placed(at: f32) -> f32 {
@@ -129,7 +132,7 @@ mod tests {
         for i in 0..200_000 {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let [a, b] = [32, 8].map(|shift| f64::from((state >> shift) as i32) / f64::from(i32::MAX));
-            let (from, by) = (f32::nearest(3.9 * a), (3.9 * b * 0.5_f64.powi(i % 30)) as f32);
+            let (from, by) = (f32::nearest(3.7 * a), (3.7 * b * 0.5_f64.powi(i % 30)) as f32);
             let expected = f32::exact(from) + (f64::from(by) / f64::from(STEP)).round_ties_even() * f64::from(STEP);
             let to = f32::moved(from, by);
             assert_eq!(f32::exact(to), expected, "from {} by {by}", f32::exact(from));
@@ -146,7 +149,8 @@ mod tests {
             assert!(f32::coordinate(at).abs() > BIG as f32 && at.is_normal(), "{by}: {}", f32::coordinate(at));
             assert!([bits(held(RIM)), bits(held(-RIM))].contains(&bits(at)), "{by}: {}", f32::exact(at));
         }
-        assert_eq!(f32::coordinate(f32::placed(7.87)), (7.87_f32 * PER_UNIT).round() * STEP);
+        assert_eq!(f32::coordinate(f32::placed(7.49)), 7.49);
+        assert_eq!(f32::coordinate(f32::placed(-7.51)), BEYOND as f32);
         assert_eq!(f32::coordinate(f32::moved(f32::nearest(-7.8), -7.9)), BEYOND as f32);
     }
 

@@ -501,7 +501,9 @@ fn refuse<T: Real>(run: &mut Run<T>, n: usize, next: T, least: f64, cause: Statu
 
 /// Refuses a step of length h that failed outright.
 fn refuse_failure<T: Real>(run: &mut Run<T>, n: usize, h: T, cause: Status) {
-    let least = if cause == Status::Singular { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
+    // In short numbers a curve that grows creeps towards the end of its coordinates.
+    let creeps = cause == Status::Singular || (T::IS_SHORT && cause == Status::Nonfinite);
+    let least = if creeps { pace::MIN_TO_SINGULAR } else { pace::MIN_STEP };
     refuse(run, n, T::of(pace::AFTER_FAILURE) * h, least, cause);
 }
 
