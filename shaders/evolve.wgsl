@@ -270,6 +270,7 @@ fn lengthen(by: Stride, errors: vec2<real>, declines: vec2<real>) {
         let next = choose(by.length, counters.order, errors, most_growth, allowed(by.length, report.before.length));
         report.progress.next = next.length;
         counters.order = next.order;
+        if IS_SHORT { report.progress.next = min(next.length, longest_step(report.now.length)); }
     }
     report.progress.slope = declines.x;
     report.progress.bend = declines.y;

@@ -11,6 +11,8 @@ const FALLS = 0.8;
 const RISES = 0.9;
 const MIN_STEP = 1e-12;
 const MIN_TO_SINGULAR = 1e-3;
+/// Largest weight of the systems of a step, in units of `h/(L/n)⁴`.
+const WEIGHT = 16.0;
 const BEHIND = 0.03125;
 const NEAREST_AIM = 0.125;
 
@@ -105,6 +107,13 @@ fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most:
     if order == dispatch.most_order || most_growth <= real(1.0) { return Choice(length * own, order); }
     let longer = real(parts(order + 1u)) / real(parts(order));
     return Choice(length * min(own * longer, most_growth), order + 1u);
+}
+
+/// The longest step that short numbers can solve for: the largest weight of its systems, WEIGHT times `h/(L/n)⁴`, times
+/// ε is the error of a solution, and above 1 no refinement helps.
+fn longest_step(length: real) -> real {
+    let edge = length / real(NODES);
+    return real(1.0 / (WEIGHT * EPSILON)) * (edge * edge) * (edge * edge);
 }
 
 /// The shortest step to try, `share` of `(L/n)⁴`.

@@ -10,6 +10,7 @@ mod conformance;
 mod faults;
 mod hostile;
 mod legible;
+mod places;
 mod resume;
 mod truth;
 
@@ -32,11 +33,12 @@ fn main() -> ExitCode {
     // Many trials wait: for a program, a compiler, or the two minutes after which a GPU is given up. These are first.
     arguments.test_threads.get_or_insert(2 + available_parallelism().map_or(1, usize::from));
     type Trials = fn() -> Vec<Trial>;
-    let modules: [(&str, Trials); 8] = [
+    let modules: [(&str, Trials); 9] = [
         ("hostile", hostile::trials),
         ("conformance", conformance::trials),
         ("faults", faults::trials),
         ("resume", resume::trials),
+        ("places", places::trials),
         ("truth", truth::trials),
         ("compilers", compilers::trials),
         ("browser", browser::trials),

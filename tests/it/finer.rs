@@ -53,7 +53,7 @@ fn same(home: &Path, one: &str, other: &str) {
 fn limits_in_f32_are_those_in_f64_within_their_errors() {
     let home = TempDir::new().unwrap();
     let curves =
-        "run --accurate --shape ellipse:choice(1.05,8),1 --amplitude 0.02 --modes 2..=5 --backend cpu --points 240";
+        "run --accurate --shape ellipse:choice(1.05,8),1 --amplitude 0.02 --modes 2..=5 --backend cpu --points 300";
     let lobes = "run --accurate --shape flower:4:0.15 --amplitude 0.05 --backend cpu --points 128";
     let mut farthest = 0.0_f64;
     for (place, spec) in [curves, lobes].into_iter().enumerate() {

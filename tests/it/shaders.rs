@@ -327,6 +327,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("NEAREST_AIM", pace::NEAREST_AIM),
         ("MIN_GROWTH", pace::MIN_GROWTH),
         ("MIN_STEP", pace::MIN_STEP),
+        ("WEIGHT", pace::WEIGHT),
         ("MIN_TO_SINGULAR", pace::MIN_TO_SINGULAR),
         ("PARTS", member::PARTS as f64),
         ("TIMES", member::TIMES as f64),

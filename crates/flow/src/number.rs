@@ -11,7 +11,7 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 mod lanes;
 pub mod place;
 
-use place::{Place, SinglePlace};
+use place::{NodePlace, SingleNodePlace};
 
 pub use lanes::{Element, Instructions, WithLanes, with_lanes};
 
@@ -80,7 +80,7 @@ pub trait Number:
     + Send
     + Sync
     + 'static
-    + Place
+    + NodePlace
     + Add<Output = Self>
     + AddAssign
     + Sub<Output = Self>
@@ -194,7 +194,7 @@ const EXP_SERIES: [f64; 14] = [
 
 /// A single number that can be copied to and from a device.
 pub trait Real:
-    Number<Real = Self, Mask = bool> + SinglePlace + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug
+    Number<Real = Self, Mask = bool> + SingleNodePlace + bytemuck::Pod + PartialOrd + std::fmt::Display + std::fmt::Debug
 {
     /// Its name in WGSL.
     const NAME: &'static str;

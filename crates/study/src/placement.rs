@@ -236,7 +236,7 @@ fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
     let (by_sweeps, crystals) = (spec.adaptive.is_some() && spec.solver().sweeps(), spec.has_crystals());
     if precision == Precision::F32 && spec.refine && (by_sweeps || crystals) {
         let (of, remedy) = match crystals {
-            true => ("of crystals", "use --precision f64, or --backend cpu"),
+            true => ("of crystals", "use --precision f64 --backend cpu"),
             false => ("by sweeps", "use --solver direct, or --precision f64"),
         };
         let problem = format!("the rounding of solves {of} in f32 is larger than the errors that it is to tell");

@@ -36,7 +36,9 @@ use forces::{
 };
 use glam::DVec2;
 use libtest_mimic::{Failed, Trial};
-use programs::{adaptive_programs_agree, check_tells, program_refuses, programs_agree, sizes_agree};
+use programs::{
+    adaptive_programs_agree, check_tells, limits_in_f32_hold, program_refuses, programs_agree, sizes_agree,
+};
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
 /// blocks of three), and one beyond 64 threads. Each has kernels of its own, whose compiler takes most of the time, so
@@ -144,6 +146,9 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         if everything() {
             add("adaptive: a dispatch may do as much as it is allowed to".into(), adaptive_largest::<T>, 0);
             add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
+        }
+        if T::NAME == "f32" && !solver.sweeps() {
+            add("adaptive: limits in f32 are those of the CPU in f64".into(), limits_in_f32_hold, 100);
         }
         add("adaptive: members that end badly leave the others untouched".into(), adaptive_bad_members::<T>, 101);
         add("adaptive: the program writes the same tables on both back ends".into(), adaptive_programs_agree::<T>, 101);

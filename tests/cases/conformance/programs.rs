@@ -152,6 +152,43 @@ fn tables_agree<T: Evolves>(solver: Solver, n: usize, pace: &[&str]) -> Result<V
     if error > bound { Err(format!("the tables differ by {error:e}").into()) } else { Ok(cpu.0) }
 }
 
+/// Limits and their errors, of an ellipse and of one that is nearly a circle.
+fn limits(backend: &str, precision: Precision, n: usize) -> Result<Vec<[f64; 2]>, Failed> {
+    let folder = tempfile::tempdir()?;
+    let mut command = command::program(folder.path());
+    command.args(["run", "--accurate", "--curves", "8", "--shape", "ellipse:choice(1.05,2),1", "--amplitude", "0.02"]);
+    command.args(["--modes", "2..=5", "--points", &n.to_string(), "--backend", backend]);
+    let output = command.args(["--precision", precision.name(), "--out", "out"]).output()?;
+    if !output.status.success() {
+        return Err(String::from_utf8(output.stderr)?.into());
+    }
+    let mut reader = csv::Reader::from_path(folder.path().join("out/summary.csv"))?;
+    let header = reader.headers()?.clone();
+    let column = |name: &str| header.iter().position(|other| other == name).ok_or(format!("no {name}"));
+    let columns = [column("t_limit")?, column("t_error")?];
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record?;
+        let [limit, error] = columns.map(|at| record[at].parse());
+        rows.push([limit?, error?]);
+    }
+    Ok(rows)
+}
+
+/// Whole adaptive runs at several levels: what the GPU computes in f32 is within its own errors of what the CPU does in
+/// f64, and within 5e-4.
+pub(super) fn limits_in_f32_hold(_: &Gpu, _: Solver, n: usize) -> Outcome {
+    let (short, long) = (limits("gpu", Precision::F32, n)?, limits("cpu", Precision::F64, n)?);
+    let off = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).abs();
+    let holds = |a: &[f64; 2], b: &[f64; 2]| off(a, b) <= a[1] && off(a, b) <= 5e-4 * b[0];
+    let farthest = short.iter().zip(&long).map(|(a, b)| off(a, b) / b[0]).fold(0.0, f64::max);
+    println!("{} limits in f32 differ from those in f64 by at most {farthest:.1e}", short.len());
+    let all = short.len() == 8 && long.len() == 8 && short.iter().zip(&long).all(|(a, b)| holds(a, b));
+    // The control: limits of other members.
+    let others = short.iter().zip(&long[1..]).any(|(a, b)| holds(a, b));
+    if all && !others { Ok(()) } else { Err(format!("f32 {short:?}, f64 {long:?}").into()) }
+}
+
 /// `curvelax check` may need minutes, during which it shows progress. The test does not wait for its end.
 pub(super) fn check_tells() -> Outcome {
     let folder = tempfile::tempdir()?;

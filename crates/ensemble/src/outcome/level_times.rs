@@ -7,8 +7,8 @@ use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
-const OF_STEPS: f64 = 5e-5;
-const OF_NODES: f64 = 4.0;
+const OF_STEPS: f64 = 1e-4;
+const OF_NODES: f64 = 12.0;
 
 /// The relaxation times of members at all levels.
 #[derive(Clone, Debug, Default)]

@@ -49,7 +49,7 @@ impl<'a> Trajectory<'a> {
         let forcing = member.forcing.unwrap_or_else(|| spec.typical().forcing);
         let forcing = forcing.kept_from([polygon::signed_area(&member.nodes), polygon::length(&member.nodes)]);
         let mut unit = unit_of(&member.nodes);
-        if precision == Precision::F32 && !spec.stops_when_relaxed() {
+        if precision == Precision::F32 && (forcing.acts() || !spec.stops_when_relaxed()) {
             unit *= growth(&flow, &forcing, radius(&member.nodes), spec.mobility() * spec.final_time());
         }
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();

@@ -12,7 +12,7 @@ use std::{
 use bytemuck::{cast, cast_slice, cast_slice_mut};
 use pulp::Simd;
 
-use super::{Mask, Number, Real, place::Place};
+use super::{Mask, Number, Real, place::NodePlace};
 
 /// Vector instructions whose token is available anywhere.
 pub trait Instructions: Simd {
@@ -273,7 +273,7 @@ impl<S: Instructions, T: Element<S>, const R: usize> Neg for Lanes<S, T, R> {
 }
 
 /// Places of f64 in vector instructions of its own; those of f32 lane by lane, which compilers make instructions of.
-impl<S: Instructions, T: Element<S>, const R: usize> Place for Lanes<S, T, R> {
+impl<S: Instructions, T: Element<S>, const R: usize> NodePlace for Lanes<S, T, R> {
     #[inline(always)]
     fn apart(mut from: Self, to: Self) -> Self {
         if !Self::IS_SHORT {

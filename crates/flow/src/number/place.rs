@@ -22,7 +22,7 @@ pub const FARTHEST: f32 = 1_073_741_824.0;
 pub const BEYOND: f64 = 1e30;
 
 /// A number as a place, or the numbers of several lanes.
-pub trait Place: Sized {
+pub trait NodePlace: Sized {
     /// Returns how far it is to a place from another.
     fn apart(from: Self, to: Self) -> Self;
     /// Returns a place after an increment.
@@ -34,10 +34,10 @@ pub trait Place: Sized {
 }
 
 /// A single number as a place.
-pub trait SinglePlace: Place {
+pub trait SingleNodePlace: NodePlace {
     /// Returns the exact coordinate of a place, and for any other bits a number from which [`nearest`] makes them.
     ///
-    /// [`nearest`]: SinglePlace::nearest
+    /// [`nearest`]: SingleNodePlace::nearest
     fn exact(place: Self) -> f64;
     /// Returns the place nearest to a coordinate.
     fn nearest(at: f64) -> Self;
@@ -53,7 +53,7 @@ fn held(steps: i32) -> f32 {
     f32::from_bits((steps.clamp(-RIM, RIM) + ORIGIN) as u32)
 }
 
-impl Place for f32 {
+impl NodePlace for f32 {
     #[inline(always)]
     fn apart(from: f32, to: f32) -> f32 {
         (to.to_bits() as i32).wrapping_sub(from.to_bits() as i32) as f32 * STEP
@@ -75,7 +75,7 @@ impl Place for f32 {
     }
 }
 
-impl SinglePlace for f32 {
+impl SingleNodePlace for f32 {
     fn exact(place: f32) -> f64 {
         (f64::from(place.to_bits() as i32) - f64::from(ORIGIN)) * f64::from(STEP)
     }
@@ -84,7 +84,7 @@ impl SinglePlace for f32 {
     }
 }
 
-impl Place for f64 {
+impl NodePlace for f64 {
     #[inline(always)]
     fn apart(from: f64, to: f64) -> f64 {
         to - from
@@ -103,7 +103,7 @@ impl Place for f64 {
     }
 }
 
-impl SinglePlace for f64 {
+impl SingleNodePlace for f64 {
     fn exact(place: f64) -> f64 {
         place
     }

@@ -352,7 +352,7 @@ impl<N: Number> Team<N> {
                 record_events(run, &taken, adaptive);
                 decay::follow(run, &taken);
                 if let Some(allowed) = allowed {
-                    lengthen(run, stride, errors, decline, allowed);
+                    lengthen(run, n, stride, errors, decline, allowed);
                     aim_at_relaxation(run, taken.before, taken.after);
                 }
                 accepted(run, taken.after, &attempt.seen, lane, adaptive);
@@ -539,13 +539,23 @@ fn record_events<T: Real>(run: &mut Run<T>, taken: &Taken<T>, adaptive: bool) {
 }
 
 /// Advances the clock by an accepted adaptive step, and chooses the length and the order of the next one.
-fn lengthen<T: Real>(run: &mut Run<T>, stride: Stride<T>, errors: [T; 2], [slope, bend]: [T; 2], allowed: Allowed<T>) {
+fn lengthen<T: Real>(
+    run: &mut Run<T>,
+    n: usize,
+    stride: Stride<T>,
+    errors: [T; 2],
+    [slope, bend]: [T; 2],
+    allowed: Allowed<T>,
+) {
     let Run { parameters, counters, report, .. } = run;
     let progress = &mut report.progress;
     // A step that was shorter than its error allowed tells little of the next one.
     if !pace::is_aimed(progress) {
         let most_growth = T::of(if counters.refused == 0 { pace::MAX_GROWTH } else { 1.0 });
         (progress.next, counters.order) = pace::choose(stride.length, counters.order, errors, most_growth, allowed);
+        if T::IS_SHORT {
+            progress.next = progress.next.min(pace::longest_step(report.now.length, T::of(n as f64)));
+        }
     }
     (progress.slope, progress.bend) = (slope, bend);
     pace::pass_time(progress, stride, parameters);

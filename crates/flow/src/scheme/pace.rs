@@ -36,6 +36,9 @@ pub const MIN_STEP: f64 = 1e-12;
 /// bound that it passed, until rounding holds them there.
 pub const MIN_TO_SINGULAR: f64 = 1e-3;
 
+/// Largest weight of the systems of a step, in units of `h/(L/n)⁴`.
+pub const WEIGHT: f64 = 16.0;
+
 /// How far behind the predicted place of an event a step ends, as a share of the way there.
 pub const BEHIND: f64 = 1.0 / 32.0;
 /// Nearest place that a step is aimed at, as a share of the length that its error allows.
@@ -164,6 +167,13 @@ pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, al
     // The next order is taken to need as much work for the same progress.
     let longer = T::of(f64::from(parts(order + 1))) / T::of(f64::from(parts(order)));
     (length * (own * longer).min(most_growth), order + 1)
+}
+
+/// Returns the longest step that short numbers can solve for: the largest weight of its systems, [`WEIGHT`] times
+/// `h/(L/n)⁴`, times ε is the error of a solution, and above 1 no refinement helps.
+pub fn longest_step<T: Real>(length: T, n: T) -> T {
+    let edge = length / n;
+    T::of(1.0 / (WEIGHT * T::EPSILON)) * (edge * edge) * (edge * edge)
 }
 
 /// Returns the shortest step to try, `share` of `(L/n)⁴`.
