@@ -146,11 +146,10 @@ fn spirv_is_valid() {
     // Two solvers, two forms, crystals, and forces with and without them, fixed and adaptive, two precisions; sweeps
     // also within a subgroup, but for 257 nodes.
     assert_eq!(judged, 3 * (20 + 20) + 2 * 20);
-    // Negative control: a word of the code is changed.
+    // Negative control: half of the code. Another word in its middle may be as valid.
     let path = folder.path().join("direct-f32-n100.spv");
     let mut bytes = fs::read(&path).unwrap();
-    let middle = bytes.len() / 8 * 4;
-    bytes[middle] ^= 0x40;
+    bytes.truncate(bytes.len() / 8 * 4);
     fs::write(&path, bytes).unwrap();
     assert!(!is_valid_spirv(&path));
 }

@@ -408,6 +408,8 @@ fn single_precision_follows_double_as_n_grows() {
 #[test]
 #[ignore = "takes a minute: cargo test --release --test it invariants -- --ignored --nocapture"]
 fn single_precision_follows_double_up_to_its_limit() {
-    assert_f32_follows(MAX_POINTS_F32);
-    f32_errors(400);
+    assert_f32_follows(320);
+    // Sweeps stop at their floor.
+    let [positions, t_relax] = f32_errors(MAX_POINTS_F32);
+    assert!(positions <= 5e-4 && t_relax.abs() <= 1.5e-3, "{positions:e}, {t_relax:e}");
 }
