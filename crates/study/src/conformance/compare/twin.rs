@@ -47,8 +47,8 @@ pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> 
 }
 
 /// How near to each other, relatively, two lengths may be whose order decides what the next step is. Rounding changes
-/// lengths of steps by up to 4e-3.
-const TIE: f64 = 0.03;
+/// lengths of steps by up to 4e-3, and how far it is from the end of a step to an aim behind it by ten times as much.
+const TIE: f64 = 0.08;
 /// By how much of itself an end and a first step are shortened.
 const SHORTER: f64 = 1.0 / 32.0;
 
