@@ -14,7 +14,7 @@ const PER_UNIT = 134217728.0;
 const STEP = 7.450580596923828e-9;
 /// Largest increment, in steps: the sum with a place is below 2³¹.
 const FARTHEST = 1073741824.0;
-/// Their coordinate: its square is infinite.
+/// The coordinate of places that count as not finite: its square is infinite.
 const BEYOND = 1e30;
 
 fn steps(place: vec) -> vec4<i32> {

@@ -57,17 +57,15 @@ impl Variant {
 
     /// Returns the files of the kernel in precision `T`, in the order of the step.
     pub fn parts<T: Real>(self) -> impl Iterator<Item = ShaderPart> {
-        let place = if T::IS_SHORT { PLACE_FIXED } else { PLACE };
+        let place = if T::IS_SHORT { shaders::PLACE_FIXED } else { shaders::PLACE };
         let solver = of_solver(self.solver);
         let trace = if self.traced { TRACE_ON } else { TRACE_OFF };
         let exchange = if self.subgroup { EXCHANGE_SUBGROUP } else { EXCHANGE };
-        BEFORE.into_iter().chain(place).chain(COMMON).chain(exchange).chain(solver.iter().copied()).chain(trace)
+        let first = [shaders::NUMBER, place];
+        first.into_iter().chain(COMMON).chain(exchange).chain(solver.iter().copied()).chain(trace)
     }
 }
 
-const BEFORE: [ShaderPart; 1] = [shaders::NUMBER];
-const PLACE: [ShaderPart; 1] = [shaders::PLACE];
-const PLACE_FIXED: [ShaderPart; 1] = [shaders::PLACE_FIXED];
 const COMMON: [ShaderPart; 19] = [
     shaders::RING,
     shaders::SUMS,

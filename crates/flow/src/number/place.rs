@@ -18,7 +18,7 @@ pub const PER_UNIT: f32 = 134_217_728.0;
 pub const STEP: f32 = 1.0 / PER_UNIT;
 /// Largest increment, in steps: the sum with a place is below 2³¹.
 pub const FARTHEST: f32 = 1_073_741_824.0;
-/// Their coordinate: its square is infinite.
+/// The coordinate of places that count as not finite: its square is infinite.
 pub const BEYOND: f64 = 1e30;
 
 /// A number as a place, or the numbers of several lanes.
