@@ -22,7 +22,7 @@ fn curvature_equation() {
     let row_b = real(0.5) * alpha_before - (middle + low + row_a);
     let row_d = -(real(0.5) * alpha) - (middle + high + row_e);
     let rate = real(1.0) / tau;
-    let row_c = (here(r_new) * rate - rkb) - (row_a + row_b + row_d + row_e);
+    let row_c = (length_of(here(r_new)) * rate - rkb) - (row_a + row_b + row_d + row_e);
     let rise = rises(Window(b(wk.low), b(wk.high)));
     let forcing = rise.plus1 * iqh - rise.here * iqm;
     normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
@@ -31,20 +31,22 @@ fn curvature_equation() {
 
 /// The rows times an unknown of these windows.
 fn curvature_applied(w: Window) -> vec {
-    return (here(r_new) * (real(1.0) / tau) - rkb) * here(w) + stiff_curvature(rises(w));
+    return (length_of(here(r_new)) * (real(1.0) / tau) - rkb) * here(w) + stiff_curvature(rises(w));
 }
 
 /// The part of that in which an unknown is seen by its differences, as differences of its second derivative.
 fn stiff_curvature(by: Rises) -> vec {
     let iqm = minus1(iq);
     let iqh = here(iq);
-    let first = by.here * iqm;
-    let second = by.plus1 * iqh;
-    let bend_before = (first - by.minus1 * minus2(iq)) * minus1(ir);
-    let bend = (second - first) * here(ir);
-    let bend_after = (by.plus2 * plus1(iq) - second) * plus1(ir);
+    let first = rounded(by.here * iqm);
+    let second = rounded(by.plus1 * iqh);
+    let bend_before = rounded((first - rounded(by.minus1 * minus2(iq))) * minus1(ir));
+    let bend = rounded((second - first) * here(ir));
+    let bend_after = rounded((rounded(by.plus2 * plus1(iq)) - second) * plus1(ir));
+    let own = rounded((bend - bend_before) * iqm);
+    let next = rounded((bend_after - bend) * iqh);
     let advection = real(0.5) * (alpha_before * by.here + alpha * by.plus1);
-    return ((bend_after - bend) * iqh - (bend - bend_before) * iqm) - advection;
+    return (next - own) - advection;
 }
 
 /// The equations of a crystal: the stiff terms are those of w = g k, with M at the nodes.
@@ -66,7 +68,7 @@ fn curvature_of_crystal() {
     let row_d = -(through.here * (irh * iqm + iqh * (irh + irp)) + row_e);
     let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
     let rate = real(1.0) / tau;
-    let row_c = (here(r_new) * rate - rkb) - (before - after) - (row_a + row_b + row_d + row_e) * here(stiffness);
+    let row_c = (length_of(here(r_new)) * rate - rkb) - (before - after) - (row_a + row_b + row_d + row_e) * here(stiffness);
     let rhs = rkb * k - stiff - (before * by_k.minus1 - after * by_k.plus1);
     normalise(
         row_a * minus2(stiffness), row_b * minus1(stiffness) + before, row_c, row_d * plus1(stiffness) - after,

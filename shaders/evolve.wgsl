@@ -7,8 +7,9 @@
 // last bit.
 
 /// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that
-/// are solved, the sweeps made for the next one, the length of the step and that of the last one.
-struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, length: real, taken: real }
+/// are solved, the sweeps made for the next one, how often solutions are refined, the length of the step and that of
+/// the last one.
+struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, refinements: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;
 
@@ -21,8 +22,9 @@ fn take_member(index: u32) {
     var next = workgroupUniformLoad(&plan);
     if (next.found & IS_DUE) == 0u { return; }
     curve = CURVE;
-    var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps);
+    var course = Course(SOLVED, next.phase, next.solve_sweeps, dispatch.steps, dispatch.sweeps, 0u);
     while (next.found & IS_DUE) != 0u && course.steps > 0u && course.sweeps > 0u {
+        course.refinements = next.refinements;
         let advanced = advance(next.order, course, moves);
         course = advanced.course;
         next = advanced.next;
@@ -61,6 +63,7 @@ fn make_plan(found: u32) {
     if ADAPTIVE {
         plan.order = counters.order;
         plan.length = stride().length;
+        if REFINED { plan.refinements = refinements(plan.length, all_reports[member].report.now.length); }
         plan.taken = all_reports[member].report.progress.taken;
     }
 }

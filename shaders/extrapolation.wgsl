@@ -7,6 +7,8 @@ const SHARED_PARTS = 3u;
 const NODE_WEIGHT = 20.0;
 /// Rounding of a step in short numbers, in units of ε.
 const NOISE = 50.0;
+/// The same of the curvature of a polygon, towards which a curve may be pulled, in units of `(n/L)²`.
+const NOISE_OF_POLYGON = 2.2351741790771484e-9;
 
 /// The steps of the paper that a step of order `order` makes.
 fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
@@ -116,7 +118,7 @@ fn finish_attempt() {
 struct LargestGaps { fields: vec, nodes: vec }
 
 fn gaps_of_attempt() -> LargestGaps {
-    let ir = vec(1.0) / new_r;
+    let ir = vec(1.0) / length_of(new_r);
     let fields = ring_maxima(vec(
         block_max(bounded_abs(load_field(GAPS))), block_max(bounded_abs(load_field(GAPS + 1u) * ir)),
         block_max(bounded_abs(load_field(GAPS + 2u))), block_max(bounded_abs(load_field(GAPS + 3u) * ir)),
@@ -151,7 +153,14 @@ fn errors_of_attempt(largest: LargestGaps) -> vec2<real> {
     let spread = min(others.x + others.y, size);
     var scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
     // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
-    if IS_SHORT { scale = max(scale, size * (real(NOISE * EPSILON) / tolerance())); }
+    if IS_SHORT {
+        var noise = size * real(NOISE * EPSILON);
+        if all_parameters[member].pull > real(0.0) {
+            let edge = sums.x / real(NODES);
+            noise += real(NOISE_OF_POLYGON) / (edge * edge);
+        }
+        scale = max(scale, noise / tolerance());
+    }
     let relative = bounded_abs(m / scale);
     let errors = vec2(max(relative.x, m.y), max(relative.z, m.w));
     if !GEOMETRIC { return errors; }

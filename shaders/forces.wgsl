@@ -235,7 +235,7 @@ fn directions(wx: Window, wy: Window) -> Directions {
 
 /// The curvature at the node between two edges: `2 sin(θ/2)` of the angle θ there over half the length of both.
 fn bent(before: Edge, after: Edge) -> vec {
-    return vertex_turn(before, after) / (real(0.5) * (before.length + after.length));
+    return rounded(vertex_turn(before, after) / (real(0.5) * (before.length + after.length)));
 }
 
 struct Force { x: vec, y: vec }
@@ -251,9 +251,9 @@ fn of_polygon(wx: Window, wy: Window, given: Directions) -> Force {
     var own = bent(e, f);
     var after = bent(f, edge(x.plus2, y.plus2));
     if CRYSTAL {
-        before = given.before.stiffness * before;
-        own = given.there.stiffness * own;
-        after = given.after.stiffness * after;
+        before = rounded(given.before.stiffness * before);
+        own = rounded(given.there.stiffness * own);
+        after = rounded(given.after.stiffness * after);
     }
     let rise = own - before;
     let next = after - own;
@@ -261,9 +261,9 @@ fn of_polygon(wx: Window, wy: Window, given: Directions) -> Force {
     let along_y = e.y + f.y;
     var inward = vec(0.0);
     if CRYSTAL {
-        inward = given.mobile * (rise / e.length) - given.mobile_after * (next / f.length);
+        inward = rounded(given.mobile * (rise / e.length)) - rounded(given.mobile_after * (next / f.length));
     } else {
-        inward = real(0.5) * (e.length + f.length) * b(own) - (next / f.length - rise / e.length);
+        inward = real(0.5) * (e.length + f.length) * b(own) - (rounded(next / f.length) - rounded(rise / e.length));
     }
     let across = inward / sqrt(along_x * along_x + along_y * along_y);
     let sliding = real(0.5) * alpha;

@@ -10,7 +10,7 @@ const KEPT_LENGTH = 28u;
 /// Rounds of a correction.
 const ROUNDS = 4u;
 /// -φ of the position equation where forces act, in units of (2π/L)².
-const DAMPING = 3.0;
+const DAMPING = 4.0;
 const TAU = 6.283185307179586;
 
 /// F + p of this step.

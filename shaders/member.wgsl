@@ -12,6 +12,7 @@ struct Parameters {
     tolerance: real,
     sor: real,
     polygon_ratio: real,
+    r_offset: real,
     relax_at: real,
     half_at: real,
     follow_to: real,

@@ -19,6 +19,21 @@ const LN_TERMS = 10u;
 
 /// e^x for |x| <= 40, clamped beyond: reduction by ln 2, then a Horner polynomial. WGSL's own exp is garbage in f64.
 fn exponential(v: vec) -> vec {
+    let parts = exponential_parts(v);
+    return ldexp(parts.more + vec(1.0), vec4<i32>(parts.power));
+}
+
+/// `e^x - 1` for the same x, with all its digits where x is small.
+fn exponential_less_one(v: vec) -> vec {
+    let parts = exponential_parts(v);
+    let scale = ldexp(vec(1.0), vec4<i32>(parts.power));
+    return parts.more * scale + (scale - vec(1.0));
+}
+
+/// a and n with `e^x = (1 + a) 2ⁿ`.
+struct ExponentialParts { more: vec, power: vec }
+
+fn exponential_parts(v: vec) -> ExponentialParts {
     let x = min(max(v, vec(-40.0)), vec(40.0));
     let n = floor(x * real(1.4426950408889634) + vec(0.5));
     let reduced = (x - n * real(0.693359375)) - n * real(-2.1219444005469058e-4);
@@ -35,8 +50,14 @@ fn exponential(v: vec) -> vec {
     sum = sum * reduced + vec(1.0 / 6.0);
     sum = sum * reduced + vec(0.5);
     sum = sum * reduced + vec(1.0);
-    sum = sum * reduced + vec(1.0);
-    return ldexp(sum, vec4<i32>(n));
+    return ExponentialParts(sum * reduced, n);
+}
+
+/// The number itself, which no compiler merges with the sum that takes it, since it would have to know that it is not
+/// clamped: where nodes share the product of which it is the result, they must see the same one.
+fn rounded(v: vec) -> vec {
+    if IS_SHORT { return max(v, vec(-2.0 * BIG)); }
+    return v;
 }
 
 /// Twice the sine of half the angle whose half has the tangent v.

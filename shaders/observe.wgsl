@@ -287,7 +287,8 @@ fn winding(ex: vec, ey: vec, fx: vec, fy: vec) -> vec {
 }
 
 /// Observes the curve given by the windows of x and y and the nodes of k and r; `moved` is how far its nodes moved.
-fn observe(wx: Window, wy: Window, kh: vec, rh: vec, moved: vec) {
+fn observe(wx: Window, wy: Window, kh: vec, stored: vec, moved: vec) {
+    let rh = length_of(stored);
     let x = rises_of_places(wx);
     let y = rises_of_places(wy);
     let own = edge(x.here, y.here).length;

@@ -13,6 +13,10 @@ const MIN_STEP = 1e-12;
 const MIN_TO_SINGULAR = 1e-3;
 /// Largest weight of the systems of a step, in units of `h/(L/n)⁴`.
 const WEIGHT = 16.0;
+/// Length of a step, as a share of the longest one, above which its solutions are refined once, twice, three times.
+const ONCE = 1e-5;
+const TWICE = 1e-3;
+const THRICE = 1e-2;
 const BEHIND = 0.03125;
 const NEAREST_AIM = 0.125;
 
@@ -114,6 +118,12 @@ fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most:
 fn longest_step(length: real) -> real {
     let edge = length / real(NODES);
     return real(1.0 / (WEIGHT * EPSILON)) * (edge * edge) * (edge * edge);
+}
+
+/// How often the solutions of a step of length h are refined.
+fn refinements(h: real, length: real) -> u32 {
+    let share = h / longest_step(length);
+    return select(1u, 0u, share <= real(ONCE)) + select(1u, 0u, share <= real(TWICE)) + select(1u, 0u, share <= real(THRICE));
 }
 
 /// The shortest step to try, `share` of `(L/n)⁴`.

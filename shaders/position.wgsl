@@ -21,12 +21,11 @@ fn position_equation() {
     let middle = irh * iqh * irp;
     let low = irh * irh * (iqm + iqh);
     let high = irp * irp * (iqh + iqp);
-    var mean_phi = vec(damping);
-    if !FORCED { mean_phi = real(0.5) * (phi(kh) + phi(kp)); }
+    let mean_phi = damped(real(0.5) * (phi(kh) + phi(kp)));
     let drift = real(0.5) * alpha - real(0.75) * (rise_of_square(wk) * iqh);
     let row_b = (mean_phi * irh + drift) - (middle + low + row_a);
     let row_d = (mean_phi * irp - drift) - (middle + high + row_e);
-    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    let q = dual_length();
     let rate = real(1.0) / tau;
     let row_c = q * rate - (row_a + row_b + row_d + row_e);
     normalise(row_a, row_b, row_c, row_d, row_e, tau * iqh);
@@ -44,7 +43,7 @@ fn position_equation() {
 
 /// The rows times an unknown of these windows.
 fn position_applied(w: Window) -> vec {
-    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    let q = dual_length();
     return q * (real(1.0) / tau) * here(w) + stiff_position(rises(w));
 }
 
@@ -54,16 +53,25 @@ fn stiff_position(by: Rises) -> vec {
     let irh = here(ir);
     let irp = plus1(ir);
     let iqh = here(iq);
-    let slope = by.here * irh;
-    let slope_after = by.plus1 * irp;
-    let bend_before = (slope - by.minus1 * minus1(ir)) * minus1(iq);
+    let slope = rounded(by.here * irh);
+    let slope_after = rounded(by.plus1 * irp);
+    let bend_before = rounded((slope - rounded(by.minus1 * minus1(ir))) * minus1(iq));
     let rise = slope_after - slope;
-    let bend = rise * iqh;
-    let bend_after = (by.plus2 * plus2(ir) - slope_after) * plus1(iq);
-    let stiff = (bend_after - bend) * irp - (bend - bend_before) * irh;
-    let mean_phi = real(0.5) * (phi(here(wk)) + phi(plus1(wk)));
+    let bend = rounded(rise * iqh);
+    let bend_after = rounded((rounded(by.plus2 * plus2(ir)) - slope_after) * plus1(iq));
+    let stiff = rounded((bend_after - bend) * irp) - rounded((bend - bend_before) * irh);
+    let mean_phi = damped(real(0.5) * (phi(here(wk)) + phi(plus1(wk))));
     let drift = real(0.5) * alpha - real(0.75) * (rise_of_square(wk) * iqh);
     return stiff + (mean_phi * rise - drift * (by.here + by.plus1));
+}
+
+/// Half the length of the segments at a node.
+fn dual_length() -> vec { return (length_of(here(r_new)) + length_of(plus1(r_new))) * real(0.5); }
+
+/// φ, or what stands for it where forces act.
+fn damped(phi: vec) -> vec {
+    if FORCED { return vec(damping); }
+    return phi;
 }
 
 /// The equations of a crystal, with `phi = M w k` and the drift `(M ∂w k + ∂(M w k))/2`.
@@ -88,8 +96,7 @@ fn position_of_crystal() {
     let phi_here = given.mobile * (w * kh);
     let phi_after = given.mobile_after * (wp * kp);
     let current = given.there.diffusivity * (wp - w);
-    var mean = vec(damping);
-    if !FORCED { mean = real(0.5) * (phi_here + phi_after); }
+    let mean = damped(real(0.5) * (phi_here + phi_after));
     let turned = real(0.5) * ((kh + kp) * current) + (phi_after - phi_here);
     let drift = real(0.5) * (alpha - turned * here(iq));
     let both = at * (s + sp);
@@ -97,7 +104,7 @@ fn position_of_crystal() {
     let row_e = sp * irpp * after;
     let row_b = (mean * irh + drift) - (irh * (both + s * before) + row_a);
     let row_d = (mean * irp - drift) - (irp * (both + sp * after) + row_e);
-    let q = (here(r_new) + plus1(r_new)) * real(0.5);
+    let q = dual_length();
     let rate = real(1.0) / tau;
     let row_c = q * rate - (row_a + row_b + row_d + row_e);
     normalise(row_a, row_b, row_c, row_d, row_e, tau * here(iq));

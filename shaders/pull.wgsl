@@ -19,5 +19,5 @@ fn pull() {
     let share = real(1.0) / (real(1.0) + rate);
     let turned = turn(new_x, new_y);
     new_k = (new_k + rate * (turned.angle / turned.span)) * share;
-    new_r = (new_r + rate * turned.edge) * share;
+    new_r = (new_r + rate * (turned.edge - vec(all_parameters[member].r_offset))) * share;
 }

@@ -8,7 +8,7 @@ var<private> alpha_before: vec;
 /// The curvatures on the window of the block: the old ones, exchanged together with lengths; for the positions the new
 /// ones.
 var<private> k_window: Window;
-/// New lengths on the window of the block.
+/// What is stored of the new lengths on the window of the block.
 var<private> r_new: Window;
 /// 1/r and 1/q on that window, of the old lengths, then of the new ones.
 var<private> ir: Window;
@@ -17,8 +17,9 @@ var<private> iq: Window;
 /// Fills the variables above, with tangential velocity if `moves`; returns the length L of the old state.
 fn redistribute(moves: bool) -> real {
     let k = load_field(curve + 2u);
-    let r = load_field(curve + 3u);
-    let old = windows(k, r);
+    let stored = load_field(curve + 3u);
+    let r = length_of(stored);
+    let old = windows(k, stored);
     k_window = old.a;
     reciprocals(old.b);
     var beta = velocity(k, k_window);
@@ -39,7 +40,7 @@ fn redistribute(moves: bool) -> real {
         alpha_before = vec(0.0);
     }
     trace(1u, alpha);
-    r_new = lone_window(r * exponential(growth));
+    r_new = lone_window(grown(stored, growth));
     reciprocals(r_new);
     return length;
 }
@@ -57,11 +58,25 @@ fn tangential_velocity(r: vec, mean_rkb: real, mean_length: real) {
     alpha = without_last_node(running);
 }
 
-/// 1/r and 1/q from one division, 1/(r q), since both are of the same size.
-fn reciprocals(w: Window) {
+/// What is stored of a length that grows by the factor e^growth.
+fn grown(stored: vec, growth: vec) -> vec {
+    let length = length_of(stored);
+    if IS_SHORT { return stored + length * exponential_less_one(growth); }
+    return length * exponential(growth) - vec(all_parameters[member].r_offset);
+}
+
+/// 1/r and 1/q from one division, 1/(r q), since both are of the same size. In short numbers each by itself: the last q
+/// is not right, and neighbours must see the same 1/r, to the last bit.
+fn reciprocals(stored: Window) {
+    let w = Window(length_of(stored.low), length_of(stored.high));
     let low_q = (w.low + minus1(w)) * real(0.5);
     // No row needs the last q.
     let high_q = (w.high + plus3(w)) * real(0.5);
+    if IS_SHORT {
+        ir = Window(vec(1.0) / w.low, vec(1.0) / w.high);
+        iq = Window(vec(1.0) / low_q, vec(1.0) / high_q);
+        return;
+    }
     let low = vec(1.0) / (w.low * low_q);
     let high = vec(1.0) / (w.high * high_q);
     ir = Window(low * low_q, high * high_q);

@@ -21,6 +21,9 @@ const PART = 30u;
 const GAPS = 34u;
 const NODE_GAPS = 38u;
 
+/// The length of segments, of which `stored` is in the state.
+fn length_of(stored: vec) -> vec { return stored + vec(all_parameters[member].r_offset); }
+
 /// Whether the entries of a field of a curve are places.
 fn is_of_places(field: u32) -> bool {
     return field < 2u;

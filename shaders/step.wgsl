@@ -4,9 +4,8 @@
 /// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
-/// Whether solutions are refined, and the nodes above which they are refined twice.
+/// Whether solutions are refined.
 const REFINED = IS_SHORT && ADAPTIVE && !SWEEPS && !CRYSTAL;
-const ONCE = 200u;
 
 /// The new curve, with the windows of its nodes.
 var<private> new_k: vec;
@@ -15,8 +14,9 @@ var<private> new_x: Window;
 var<private> new_y: Window;
 
 /// What is left to do, the same in every thread: how the last solve ended, the systems that the attempt has solved, the
-/// sweeps made for the next one, and the steps of the paper and the sweeps that this dispatch may still make.
-struct Course { ended: u32, phase: u32, solve_sweeps: u32, steps: u32, sweeps: u32 }
+/// sweeps made for the next one, the steps of the paper and the sweeps that this dispatch may still make, and how often
+/// solutions are refined.
+struct Course { ended: u32, phase: u32, solve_sweeps: u32, steps: u32, sweeps: u32, refinements: u32 }
 
 /// Forgets what the last step and the last attempt have left in private variables: compilers do not see that nothing
 /// reads it again, and would keep it in registers.
@@ -83,7 +83,7 @@ fn step(begun: Course, moves: bool) -> Course {
         if REFINED {
             gather(positions, round > 0u);
             round += 1u;
-            if done.ended == SOLVED && round <= select(1u, 2u, NODES > ONCE) { continue; }
+            if done.ended == SOLVED && round <= course.refinements { continue; }
             round = 0u;
         }
         if positions { end_positions(made); } else { end_curvature(made); }

@@ -22,7 +22,7 @@ use curvelax::{
     solver::{
         Blocks, Solver,
         gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
-        refinement, sweeps,
+        sweeps,
     },
 };
 use naga::{
@@ -352,7 +352,10 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("AFTER_REFUSALS", pace::AFTER_REFUSALS),
         ("ROUNDING", pace::ROUNDING),
         ("NOISE", extrapolation::NOISE),
-        ("ONCE", refinement::ONCE as f64),
+        ("ONCE", pace::ONCE),
+        ("TWICE", pace::TWICE),
+        ("THRICE", pace::THRICE),
+        ("NOISE_OF_POLYGON", extrapolation::NOISE_OF_POLYGON),
         ("FALLS", pace::FALLS),
         ("RISES", pace::RISES),
         ("POINTS", f64::from(decay::POINTS)),

@@ -162,12 +162,13 @@ impl NaturalScale {
     pub fn of(self, curve: &Curve<f64>, p: &Parameters<f64>, work: &Workspace<f64>) -> f64 {
         let largest = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
         let k = || largest(&mut curve.k.nodes().iter().map(|k| k.abs()));
-        let longest = || largest(&mut curve.r.nodes().iter().copied());
+        let lengths = || curve.r.nodes().iter().map(|stored| p.length_of(*stored));
+        let longest = || largest(&mut lengths());
         let weight = |rows: &[Coefficients<f64>]| largest(&mut rows.iter().map(|row| row.weight));
-        let length: f64 = curve.r.nodes().iter().sum();
+        let length: f64 = lengths().sum();
         match self {
             NaturalScale::Velocity => {
-                let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                let shortest = lengths().fold(f64::INFINITY, f64::min);
                 k() / (shortest * shortest) + p.law(p.branches().law).b(k()).abs()
             }
             NaturalScale::Tangential => work.motion.rkb.iter().map(|v| v.abs()).sum::<f64>() + p.omega * length,
@@ -179,11 +180,10 @@ impl NaturalScale {
             NaturalScale::Position => length / std::f64::consts::TAU,
             NaturalScale::Area => length * length / (4.0 * std::f64::consts::PI),
             NaturalScale::Energy => {
-                curve.k.nodes().iter().zip(curve.r.nodes()).map(|(k, r)| k * k * r).sum::<f64>()
-                    + p.length_penalty() * length
+                curve.k.nodes().iter().zip(lengths()).map(|(k, r)| k * k * r).sum::<f64>() + p.length_penalty() * length
             }
             NaturalScale::Mesh => {
-                let shortest = curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+                let shortest = lengths().fold(f64::INFINITY, f64::min);
                 length / std::f64::consts::TAU / shortest
             }
             NaturalScale::SolvedPosition => longest() * weight(&work.position.system.rows).sqrt(),

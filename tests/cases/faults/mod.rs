@@ -138,7 +138,7 @@ const POISONS: [Poison; 9] = [
         run.state.curve.k.close();
     }),
     ("all lengths are 0", |run| {
-        (0..POINTS).for_each(|i| run.state.curve.r[i] = 0.0);
+        (0..POINTS).for_each(|i| run.state.curve.r[i] = -run.parameters.r_offset);
         run.state.curve.r.close();
     }),
     ("its ω is NaN", |run| run.parameters.omega = f64::NAN),
@@ -149,7 +149,7 @@ fn renew(run: &mut Run<f64>, change: impl FnOnce(&mut [DVec2])) {
     let mut nodes: Vec<DVec2> = run.state.curve.positions().collect();
     change(&mut nodes);
     let (counters, next) = (run.counters, run.report.progress.next);
-    *run = Run { counters, ..Run::new(State::from_nodes(&nodes), run.parameters) };
+    *run = Run { counters, ..Run::new(State::with_offset(&nodes, run.parameters.r_offset), run.parameters) };
     run.report.progress.next = next;
 }
 

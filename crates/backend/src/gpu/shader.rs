@@ -164,7 +164,7 @@ pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
 }
 
 /// Numbers and integers of a `Plan` in the kernel.
-const PLAN: (usize, usize) = (2, 4);
+const PLAN: (usize, usize) = (2, 5);
 
 /// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the plan of an
 /// attempt, a decision and the member.
@@ -173,7 +173,8 @@ const PLAN: (usize, usize) = (2, 4);
 pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
     let kernel = &variant.solver.facts().kernel;
     let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
-    (4 * rows * blocks.count() + PLAN.0) * size_of::<T>() + (PLAN.1 + 2) * size_of::<u32>()
+    let integers = (PLAN.1 * size_of::<u32>()).next_multiple_of(size_of::<T>());
+    (4 * rows * blocks.count() + PLAN.0) * size_of::<T>() + integers + 2 * size_of::<u32>()
 }
 
 #[cfg(test)]

@@ -7,8 +7,10 @@ use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
-const OF_STEPS: f64 = 1e-4;
-const OF_NODES: f64 = 12.0;
+const OF_STEPS: f64 = 5e-5;
+const OF_NODES: f64 = 6.0;
+/// How much larger they are in the geometric form.
+const OF_GEOMETRIC: f64 = 3.0;
 
 /// The relaxation times of members at all levels.
 #[derive(Clone, Debug, Default)]
@@ -72,7 +74,8 @@ impl Ladder {
             return None;
         }
         let tolerance = tolerance(spec);
-        let rounding = precisions.into_iter().map(|precision| rounding(precision, excess)).collect();
+        let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
+        let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess)).collect();
         let levels = times;
         Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess }))
     }

@@ -101,7 +101,7 @@ impl Trajectory<'_> {
                 x: field(&curve.x, unit, origin.x),
                 y: field(&curve.y, unit, origin.y),
                 k: field(&curve.k, 1.0 / unit, 0.0),
-                r: field(&curve.r, unit, 0.0),
+                r: field(&curve.r, unit, unit * self.launch.parameters.r_offset),
             };
             if output.frame {
                 let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y));

@@ -54,8 +54,12 @@ impl<'a> Trajectory<'a> {
         }
         let nodes: Vec<DVec2> = member.nodes.iter().map(|node| *node / unit).collect();
         let time_unit = unit.powi(4) / spec.mobility();
-        let parameters = parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
-        let mut launch = Run::new(State::from_nodes(&nodes), parameters);
+        let mut parameters =
+            parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
+        if precision == Precision::F32 {
+            parameters.r_offset = (polygon::length(&nodes) / nodes.len() as f64) as f32 as f64;
+        }
+        let mut launch = Run::new(State::with_offset(&nodes, parameters.r_offset), parameters);
         launch.counters.order =
             FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
@@ -167,7 +171,8 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, time_unit: f64, precision: Pre
     parameters.adaptive = ERROR_PER_TOLERANCE * tolerance;
     (parameters.time_unit, parameters.time_tick) = (ticks.unit, ticks.tick);
     (parameters.end_high, parameters.end_low) = ticks.split(end);
-    let shortest = launch.state.curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+    let stored = launch.state.curve.r.nodes().iter().copied().fold(f64::INFINITY, f64::min);
+    let shortest = launch.parameters.length_of(stored);
     launch.report.progress.next = (FIRST_STEP * shortest.powi(4)).max(FIRST_TICKS * ticks.tick);
     (Time::Adaptive(ticks), status)
 }

@@ -17,7 +17,7 @@ use curvelax_base::{input, text};
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
 /// Version of the format: of the envelope, and of numbers whose order no layout shows.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Bytes before the counted part, and after it.
 const BEFORE: usize = MAGIC.len() + 4 + 8;
 const AFTER: usize = 4;
@@ -190,7 +190,7 @@ mod tests {
             read(&sealed_again(bytes)).unwrap_err()
         };
         assert_eq!(with(0, b'C'), Fault::Foreign("it is not a checkpoint of curvelax".into()));
-        let older = Fault::Foreign("its format is 2, and that of this version is 3".into());
+        let older = Fault::Foreign("its format is 2, and that of this version is 4".into());
         assert_eq!(with(MAGIC.len(), 2), older);
         let Fault::Foreign(message) = with(BEFORE + 5, b'9') else { panic!("another version of the program") };
         assert!(message.starts_with("it is of curvelax 9."), "{message}");

@@ -19,7 +19,7 @@ pub struct Curvature<'a, N> {
     old: &'a Curve<N>,
     pub(super) new: &'a Curve<N>,
     pub(super) motion: &'a Motion<N>,
-    tau: N,
+    p: &'a Parameters<N>,
     /// 1/τ.
     pub(super) rate: N,
 }
@@ -27,8 +27,8 @@ pub struct Curvature<'a, N> {
 impl<'a, N: Number> Curvature<'a, N> {
     /// Returns the system of a step of `p.tau` from `old`, with the lengths of `new`.
     #[inline(always)]
-    pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &Parameters<N>) -> Self {
-        Curvature { old, new, motion, tau: p.tau, rate: p.tau.recip() }
+    pub fn new(old: &'a Curve<N>, new: &'a Curve<N>, motion: &'a Motion<N>, p: &'a Parameters<N>) -> Self {
+        Curvature { old, new, motion, p, rate: p.tau.recip() }
     }
 }
 
@@ -42,7 +42,7 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
         let [_, rise_of_b, rise_of_bp, _] = self.motion.b.rises(i);
-        let (r, rkb) = (self.new.r[i], self.motion.rkb[i]);
+        let (r, rkb) = (self.p.length_of(self.new.r[i]), self.motion.rkb[i]);
         let half = N::of(0.5);
         let a = iqm * irm * iqmm;
         let e = iq * irp * iqp;
@@ -54,12 +54,12 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let c = (r * self.rate - rkb) - (a + b + d + e);
         let forcing = rise_of_bp * iq - rise_of_b * iqm;
         let stiff = self.stiff_curvature(i, self.old.k.rises(i));
-        Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.tau * ir }
+        Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.p.tau * ir }
     }
 
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
-        let own = self.new.r[i] * self.rate - self.motion.rkb[i];
+        let own = self.p.length_of(self.new.r[i]) * self.rate - self.motion.rkb[i];
         own * unknown[i] + self.stiff_curvature(i, unknown.rises(i))
     }
 }
@@ -71,11 +71,12 @@ impl<N: Number> Curvature<'_, N> {
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
-        let (first, second) = (here * iqm, after * iq);
-        let bend_before = (first - before * iqmm) * irm;
-        let bend = (second - first) * ir;
-        let bend_after = (last * iqp - second) * irp;
-        ((bend_after - bend) * iq - (bend - bend_before) * iqm) - N::of(0.5) * (alpha_m * here + alpha * after)
+        let (first, second) = ((here * iqm).rounded(), (after * iq).rounded());
+        let bend_before = ((first - (before * iqmm).rounded()) * irm).rounded();
+        let bend = ((second - first) * ir).rounded();
+        let bend_after = (((last * iqp).rounded() - second) * irp).rounded();
+        let (own, next) = (((bend - bend_before) * iqm).rounded(), ((bend_after - bend) * iq).rounded());
+        (next - own) - N::of(0.5) * (alpha_m * here + alpha * after)
     }
 
     /// The equation of a crystal.
@@ -88,7 +89,7 @@ impl<N: Number> Curvature<'_, N> {
         let [_, iqm, iq, _, _] = self.motion.iq.window(i);
         let [pmm, pm, p, pp, _] = forces::conductance(self.motion, i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
-        let (r, rkb) = (self.new.r[i], self.motion.rkb[i]);
+        let (r, rkb) = (self.p.length_of(self.new.r[i]), self.motion.rkb[i]);
         let half = N::of(0.5);
         let (before, after) = (half * alpha_m, half * alpha);
         let a = iqm * irm * pmm;
@@ -99,6 +100,6 @@ impl<N: Number> Curvature<'_, N> {
         let c = (r * self.rate - rkb) - (before - after) - (a + b + d + e) * g;
         let rhs = rkb * self.old.k[i] - stiff - (before * km - after * kp);
         let (a, b, d, e) = (a * gmm, b * gm + before, d * gp - after, e * gpp);
-        Equation { a, b, c, d, e, rhs: [rhs], time_over_length: self.tau * ir }
+        Equation { a, b, c, d, e, rhs: [rhs], time_over_length: self.p.tau * ir }
     }
 }

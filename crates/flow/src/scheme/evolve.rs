@@ -233,6 +233,9 @@ impl<N: Number> Team<N> {
                 self.strides[lane] = pace::stride(&run.report.progress, &run.parameters);
                 h.set_lane(lane, self.strides[lane].length);
                 orders.set_lane(lane, N::Real::of(f64::from(run.counters.order)));
+                let (length, n) = (run.report.now.length, N::Real::of(self.work.blocks.n as f64));
+                let refinements = pace::refinements(self.strides[lane].length, length, n);
+                self.work.refinements.set_lane(lane, N::Real::of(f64::from(refinements)));
                 if live.lane(lane) {
                     most = run.counters.order.max(most);
                 }
@@ -404,7 +407,7 @@ impl<N: Number> Team<N> {
                 _ => &state.part,
             };
             let sums = observe::sums(curve, parameters, branches.law, work.blocks);
-            seen[look] = observe::observed(&sums, &observe::maxima(curve));
+            seen[look] = observe::observed(&sums, &observe::maxima(curve, parameters));
         }
         let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };
         [observe::reaches_level(&seen[last], parameters), passed]

@@ -20,7 +20,7 @@ use super::{
     state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from},
 };
 use crate::{
-    number::{BIG, Number, Real},
+    number::{BIG, Number, Real, place::STEP},
     solver::{Blocks, Ring},
 };
 
@@ -38,6 +38,8 @@ pub const NODE_WEIGHT: f64 = 20.0;
 /// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of
 /// the rows multiply it.
 pub const NOISE: f64 = 50.0;
+/// The same of the curvature of a polygon, towards which a curve may be pulled, in units of `(n/L)²`.
+pub const NOISE_OF_POLYGON: f64 = 0.3 * STEP as f64;
 
 /// The last parts of a row, which go into the combinations.
 pub const SHARED_PARTS: u32 = 3;
@@ -250,7 +252,7 @@ pub fn errors_of_attempt<N: Number>(
     let (mut gap_k, mut gap_r, mut lower_k, mut lower_r) = (N::of(0.0), N::of(0.0), N::of(0.0), N::of(0.0));
     let (mut k_max, mut minus_k_min) = (low, low);
     for i in 0..new.len() {
-        let ir = new.r[i].recip();
+        let ir = p.length_of(new.r[i]).recip();
         gap_k = gap_k.max(gaps.k[i].bounded_abs());
         gap_r = gap_r.max((gaps.r[i] * ir).bounded_abs());
         lower_k = lower_k.max(gaps.lower_k[i].bounded_abs());
@@ -263,7 +265,12 @@ pub fn errors_of_attempt<N: Number>(
     let mut scale = N::select(followed, (size * spread).sqrt(), size);
     if N::IS_SHORT {
         // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
-        scale = scale.max(size * (N::of(NOISE * N::EPSILON) / tolerance(p)));
+        let mut noise = size * N::of(NOISE * N::EPSILON);
+        if branches.pulled {
+            let edge = length / N::of(new.len() as f64);
+            noise += N::of(NOISE_OF_POLYGON) / (edge * edge);
+        }
+        scale = scale.max(noise / tolerance(p));
     }
     let errors = [(gap_k / scale).bounded_abs().max(gap_r), (lower_k / scale).bounded_abs().max(lower_r)];
     if !branches.geometric {
@@ -292,7 +299,7 @@ pub fn errors_of_attempt<N: Number>(
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{super::forcing::DAMPING, *};
 
     /// The end, the derivative and the second derivative of a step of length h for y' = -y², y(0) = 1, by the explicit
     /// Euler method, and the two errors.
@@ -329,6 +336,27 @@ mod tests {
                     assert!((observed(of) - order).abs() < 0.35, "{expected}: {of}: {} of {order}", observed(of));
                 }
             }
+        }
+    }
+
+    /// The largest factor by which a step of this order multiplies a mode of a driven circle.
+    fn most_amplified(order: u32, damping: f64) -> f64 {
+        let mut most = 0.0_f64;
+        for (mode, tenths) in (2..40).flat_map(|mode| (-50..80).map(move |tenths| (mode, tenths))) {
+            let (m, h) = (f64::from(mode), 10f64.powf(f64::from(tenths) / 10.0));
+            let own = |tau: f64, k: f64| 1.0 / (1.0 + tau * (k.powi(4) + damping * k * k));
+            let part = |tau: f64| 1.0 - 0.5 * m * m * (m * m - 1.0) * tau * (own(tau, m + 1.0) + own(tau, m - 1.0));
+            let row = |j: u32| weight::<f64>(j, 1, order) * part(h / f64::from(j)).powi(j as i32);
+            most = most.max((1..=order).map(row).sum::<f64>().abs());
+        }
+        most
+    }
+
+    #[test]
+    fn no_mode_of_a_driven_circle_grows_in_a_step_of_any_length_and_order() {
+        for order in LEAST_ORDER..=MOST_ORDER {
+            let (own, less) = (most_amplified(order, DAMPING), most_amplified(order, 3.0));
+            assert!(own <= 1.0 && less > 1.1, "order {order}: {own} {less}");
         }
     }
 

@@ -113,7 +113,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
         let ([_, ex, fx, _], [_, ey, fy, _]) = (old.x.rises_of_places(i), old.y.rises_of_places(i));
         let [_, _, e, f, _] = motion.edge.window(i);
         let bent = bent([ex, ey, e], [fx, fy, f]);
-        motion.bent[i] = if crystal { motion.stiffness_there[i] * bent } else { bent };
+        motion.bent[i] = if crystal { (motion.stiffness_there[i] * bent).rounded() } else { bent };
     }
     motion.bent.close();
 }
@@ -121,7 +121,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
 /// The curvature at the node between two edges `[x, y, length]`.
 #[inline(always)]
 fn bent<N: Number>(before: [N; 3], after: [N; 3]) -> N {
-    vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))
+    (vertex_turn(before, after) / (N::of(0.5) * (before[2] + after[2]))).rounded()
 }
 
 /// `q (βN + αT)` at node i of the polygon that was measured: the second difference of its own curvature and `b` along
@@ -136,11 +136,11 @@ pub fn of_polygon<N: Number>(old: &Curve<N>, motion: &Motion<N>, i: usize) -> [N
     let kind = motion.law.kind;
     let inward = if kind.is_diffusive() {
         let [_, _, mobile, mobile_after, _] = motion.mobile.window(i);
-        mobile * (rise / e) - mobile_after * (next / f)
+        (mobile * (rise / e)).rounded() - (mobile_after * (next / f)).rounded()
     } else if kind.is_crystal() {
-        rise / e - next / f
+        (rise / e).rounded() - (next / f).rounded()
     } else {
-        half * (e + f) * motion.law.b(motion.bent[i]) - (next / f - rise / e)
+        half * (e + f) * motion.law.b(motion.bent[i]) - ((next / f).rounded() - (rise / e).rounded())
     };
     let across = inward / (along[0] * along[0] + along[1] * along[1]).sqrt();
     let sliding = half * motion.alpha[i];

@@ -34,9 +34,9 @@ use crate::{
 /// Rounds of a correction. Each divides what is left by a thousand or more: the first takes an error of the step, the
 /// last one that of rounding.
 pub const ROUNDS: usize = 4;
-/// -φ of the position equation where forces act, in units of `(2π/L)²`. Below 2.6 mode 2 of a circle is not stable in
-/// steps of any length.
-pub const DAMPING: f64 = 3.0;
+/// -φ of the position equation where forces act, in units of `(2π/L)²`: the least that is stable for all modes of a
+/// circle in steps of any length and order.
+pub const DAMPING: f64 = 4.0;
 
 impl Kind {
     /// Whether anything acts beside the flow.
@@ -64,7 +64,7 @@ pub fn act<N: Number>(
 ) -> N {
     let mut sums = Sums::new(blocks);
     for i in 0..old.len() {
-        let (r, k) = (old.r[i], old.k[i]);
+        let (r, k) = (p.length_of(old.r[i]), old.k[i]);
         sums.add(i, [r * k, r * k * k, r * motion.beta[i], motion.rkb[i]]);
     }
     let [turn, bent, moved, turned] = sums.totals();
@@ -82,7 +82,7 @@ pub fn act<N: Number>(
         let k = old.k[i];
         let beta = motion.beta[i] + (force + tension * k);
         motion.beta[i] = beta;
-        motion.rkb[i] = old.r[i] * k * beta;
+        motion.rkb[i] = p.length_of(old.r[i]) * k * beta;
         sum.add(i, [motion.rkb[i]]);
         motion.b[i] += tension * k;
     }

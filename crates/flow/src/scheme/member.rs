@@ -85,6 +85,9 @@ numbers! {
         sor,
         /// The quotient of n nodes at [equilibrium](crate::equilibrium), `(n/π)·tan(π/n)` of a circle.
         polygon_ratio,
+        /// What stored lengths of segments lack, the mean length of those of the start in short numbers: their digits
+        /// are for what differs and changes. 0 in f64.
+        r_offset,
         /// Excess at which the member is relaxed.
         relax_at,
         /// Half the excess at the start.

@@ -109,7 +109,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
     let mut sums = solver::Sums::new(blocks);
     let regular = Regular::near(new, blocks);
     for i in 0..new.len() {
-        let (k, r, e) = (new.k[i], new.r[i], edge(new, i)[2]);
+        let (k, r, e) = (new.k[i], p.length_of(new.r[i]), edge(new, i)[2]);
         turn = turn.max((k * r).bounded_abs());
         slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
         minus_shortest = minus_shortest.max(-e.bounded_abs());
@@ -191,7 +191,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
     for i in 0..curve.len() {
         let k = curve.k[i];
         let energy = match kind.conserved {
-            0 => p.energy_density(k) * curve.r[i],
+            0 => p.energy_density(k) * p.length_of(curve.r[i]),
             _ => p.energy_at_vertex(edge(curve, i), edge(curve, (i + 1) % curve.len())),
         };
         let [longer, more] = regular.exceeded(curve, i);
@@ -208,11 +208,11 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
 
 /// Computes the maxima over the ring.
 #[inline(always)]
-pub fn maxima<N: Number>(curve: &Curve<N>) -> Maxima<N> {
+pub fn maxima<N: Number>(curve: &Curve<N>, p: &Parameters<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
     let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
     for i in 0..curve.x.len() {
-        let (k, r, e) = (curve.k[i], curve.r[i], edge(curve, i)[2]);
+        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve, i)[2]);
         m.drift = m.drift.max(((r - e) / e).bounded_abs());
         m.longest = m.longest.max(e.bounded_abs());
         m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
@@ -487,7 +487,7 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
 /// Observes a curve.
 #[inline(never)]
 pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve))
+    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve, p))
 }
 
 /// Derives the observables from the sums and maxima of a curve.

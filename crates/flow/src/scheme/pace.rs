@@ -39,6 +39,14 @@ pub const MIN_TO_SINGULAR: f64 = 1e-3;
 /// Largest weight of the systems of a step, in units of `h/(L/n)⁴`.
 pub const WEIGHT: f64 = 16.0;
 
+/// Length of a step, as a share of the longest one, above which its solutions are refined. Without, a solution is off
+/// by about that share of itself.
+pub const ONCE: f64 = 1e-5;
+/// The same, above which they are refined twice.
+pub const TWICE: f64 = 1e-3;
+/// The same, above which they are refined three times.
+pub const THRICE: f64 = 1e-2;
+
 /// How far behind the predicted place of an event a step ends, as a share of the way there.
 pub const BEHIND: f64 = 1.0 / 32.0;
 /// Nearest place that a step is aimed at, as a share of the length that its error allows.
@@ -176,6 +184,13 @@ pub fn longest_step<T: Real>(length: T, n: T) -> T {
     T::of(1.0 / (WEIGHT * T::EPSILON)) * (edge * edge) * (edge * edge)
 }
 
+/// Returns how often the solutions of a step of length h are [refined](crate::solver::refinement): the more often, the
+/// larger the weights of their systems.
+pub fn refinements<T: Real>(h: T, length: T, n: T) -> u32 {
+    let share = h / longest_step(length, n);
+    [ONCE, TWICE, THRICE].map(|most| u32::from(!share.le(T::of(most)))).iter().sum()
+}
+
 /// Returns the shortest step to try, `share` of `(L/n)⁴`.
 pub fn least_step<T: Real>(length: T, n: T, share: f64, p: &Parameters<T>) -> T {
     let edge = length / n;
@@ -185,6 +200,14 @@ pub fn least_step<T: Real>(length: T, n: T, share: f64, p: &Parameters<T>) -> T 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn solutions_are_refined_the_more_often_the_longer_the_step() {
+        let (length, n) = (6.0, 100.0);
+        let most = longest_step::<f32>(length, n);
+        let often = [1e-6, 1e-4, 5e-3, 0.5, f32::NAN].map(|share| refinements(share * most, length, n));
+        assert_eq!(often, [0, 1, 2, 3, 3]);
+    }
 
     #[test]
     fn a_step_ends_shortly_behind_where_the_excess_falls_to_a_threshold() {

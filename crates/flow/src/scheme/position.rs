@@ -19,7 +19,7 @@ pub struct Position<'a, N> {
     pub(super) new: &'a Curve<N>,
     pub(super) motion: &'a Motion<N>,
     geometric: bool,
-    tau: N,
+    p: &'a Parameters<N>,
     /// 1/τ.
     pub(super) rate: N,
 }
@@ -31,19 +31,17 @@ impl<'a, N: Number> Position<'a, N> {
         old: &'a Curve<N>,
         new: &'a Curve<N>,
         motion: &'a Motion<N>,
-        p: &Parameters<N>,
+        p: &'a Parameters<N>,
         branches: Branches,
     ) -> Self {
-        Position { old, new, motion, geometric: branches.geometric, tau: p.tau, rate: p.tau.recip() }
+        Position { old, new, motion, geometric: branches.geometric, p, rate: p.tau.recip() }
     }
 }
 
 impl<N: Number> Equations<N, 2> for Position<'_, N> {
     #[inline(always)]
     fn equation(&self, i: usize) -> Equation<N, 2> {
-        let [_, _, r, rp, _] = self.new.r.window(i);
-        let iq = self.motion.iq[i];
-        let q = (r + rp) * N::of(0.5);
+        let (q, iq) = (self.dual_length(i), self.motion.iq[i]);
         let off = if self.motion.law.kind.is_crystal() { self.of_crystal(i) } else { self.of_paper(i) };
         let [a, b, d, e] = off;
         let c = q * self.rate - (a + b + d + e);
@@ -54,13 +52,12 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
                 -self.stiff_position(i, self.old.y.rises_of_places(i)),
             ],
         };
-        Equation { a, b, c, d, e, rhs, time_over_length: self.tau * iq }
+        Equation { a, b, c, d, e, rhs, time_over_length: self.p.tau * iq }
     }
 
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
-        let [_, _, r, rp, _] = self.new.r.window(i);
-        (r + rp) * N::of(0.5) * self.rate * unknown[i] + self.stiff_position(i, unknown.rises(i))
+        self.dual_length(i) * self.rate * unknown[i] + self.stiff_position(i, unknown.rises(i))
     }
 }
 
@@ -72,15 +69,28 @@ impl<N: Number> Position<'_, N> {
         let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
         let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let half = N::of(0.5);
-        let (slope, slope_after) = (here * ir, after * irp);
-        let bend_before = (slope - before * irm) * iqm;
+        let (slope, slope_after) = ((here * ir).rounded(), (after * irp).rounded());
+        let bend_before = ((slope - (before * irm).rounded()) * iqm).rounded();
         let rise = slope_after - slope;
-        let bend = rise * iq;
-        let bend_after = (last * irpp - slope_after) * iqp;
-        let stiff = (bend_after - bend) * irp - (bend - bend_before) * ir;
-        let phi = half * (self.motion.law.phi(k) + self.motion.law.phi(kp));
+        let bend = (rise * iq).rounded();
+        let bend_after = (((last * irpp).rounded() - slope_after) * iqp).rounded();
+        let stiff = ((bend_after - bend) * irp).rounded() - ((bend - bend_before) * ir).rounded();
+        let phi = self.damped(half * (self.motion.law.phi(k) + self.motion.law.phi(kp)));
         let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
         stiff + (phi * rise - drift * (here + after))
+    }
+
+    /// Half the length of the segments at node i.
+    #[inline(always)]
+    fn dual_length(&self, i: usize) -> N {
+        let [_, _, r, rp, _] = self.new.r.window(i);
+        (self.p.length_of(r) + self.p.length_of(rp)) * N::of(0.5)
+    }
+
+    /// φ, or what stands for it where forces act.
+    #[inline(always)]
+    fn damped(&self, phi: N) -> N {
+        if self.motion.law.kind.is_forced() { self.motion.damping } else { phi }
     }
 
     /// 𝓐, 𝓑, 𝓓 and 𝓔.
@@ -95,10 +105,7 @@ impl<N: Number> Position<'_, N> {
         let middle = ir * iq * irp;
         let low = ir * ir * (iqm + iq);
         let high = irp * irp * (iq + iqp);
-        let phi = match self.motion.law.kind.is_forced() {
-            true => self.motion.damping,
-            false => half * (self.motion.law.phi(k) + self.motion.law.phi(kp)),
-        };
+        let phi = self.damped(half * (self.motion.law.phi(k) + self.motion.law.phi(kp)));
         let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
         [a, (phi * ir + drift) - (middle + low + a), (phi * irp - drift) - (middle + high + e), e]
     }
@@ -123,7 +130,7 @@ impl<N: Number> Position<'_, N> {
             (phi, phi_after) = (mobile * phi, mobile_after * phi_after);
             current = motion.mobile_there[i] * current;
         }
-        let mean = if motion.law.kind.is_forced() { motion.damping } else { half * (phi + phi_after) };
+        let mean = self.damped(half * (phi + phi_after));
         let turned = half * ((k + kp) * current) + (phi_after - phi);
         let drift = half * (motion.alpha[i] - turned * iq);
         let both = here * (s + sp);
@@ -132,5 +139,55 @@ impl<N: Number> Position<'_, N> {
         let b = (mean * ir + drift) - (ir * (both + s * before) + a);
         let d = (mean * irp - drift) - (irp * (both + sp * after) + e);
         [a, b, d, e]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use glam::DVec2;
+
+    use super::{
+        super::{State, Workspace, step},
+        *,
+    };
+    use crate::{
+        flow::Flow,
+        forcing::{Drive, Forcing},
+        solver::{Blocks, Solver},
+    };
+
+    /// By how much the rows times an unknown differ from what is [applied](Equations::applied) to it, relative to that.
+    fn mismatch(forcing: &Forcing, geometric: bool) -> f64 {
+        let n = 24;
+        let at = |i: usize| TAU * i as f64 / n as f64;
+        let nodes: Vec<DVec2> = (0..n).map(|i| DVec2::from_angle(at(i)) * (1.0 + 0.2 * (3.0 * at(i)).sin())).collect();
+        let mut p =
+            Parameters { geometric: f64::from(u8::from(geometric)), ..Parameters::of_flow(&Flow::Elastic(0.3), 0.1) };
+        forcing.write(&mut p.law, 1.0);
+        let mut state = State::<f64>::from_nodes(&nodes);
+        let mut work = Workspace::new(Blocks::new(n).unwrap());
+        let State { curve, increments, .. } = &mut state;
+        step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
+        let equations = Position::new(curve, &work.new, &work.motion, &p, p.branches());
+        let unknown = Ring::from_nodes((0..n).map(|i| (7.0 * i as f64).sin()));
+        let mut worst = 0.0_f64;
+        for i in 0..n {
+            let [mm, m, own, next, last] = unknown.window(i);
+            let Equation { a, b, c, d, e, .. } = equations.equation(i);
+            let product = a * mm + b * m + c * own + d * next + e * last;
+            worst = worst.max((equations.applied(i, &unknown) / product - 1.0).abs());
+        }
+        worst
+    }
+
+    #[test]
+    fn what_is_applied_to_an_unknown_is_the_matrix() {
+        let driven = Forcing { drive: Some(Drive::Constant(0.3)), ..Forcing::default() };
+        for (forcing, geometric) in [(&Forcing::default(), false), (&Forcing::default(), true), (&driven, true)] {
+            let mismatch = mismatch(forcing, geometric);
+            assert!(mismatch < 1e-10, "{forcing:?}: {mismatch:e}");
+        }
     }
 }

@@ -34,7 +34,7 @@ pub fn pull<N: Number>(curve: &mut Curve<N>, p: &Parameters<N>, branches: Branch
     for i in 0..curve.len() {
         let [angle, span] = turn(curve, i);
         curve.k[i] = (curve.k[i] + rate * (angle / span)) * share;
-        curve.r[i] = (curve.r[i] + rate * edge(curve, i)[2]) * share;
+        curve.r[i] = (curve.r[i] + rate * (edge(curve, i)[2] - p.r_offset)) * share;
     }
     curve.k.close();
     curve.r.close();

@@ -26,15 +26,16 @@ pub fn redistribute<N: Number>(
     r: &mut Ring<N>,
 ) -> N {
     let n = N::of(old.len() as f64);
-    reciprocals(&old.r, motion);
+    reciprocals(&old.r, p, motion);
     forces::fill(old, p, branches.law, motion);
     let mut sums = Sums::new(blocks);
     for i in 0..old.len() {
         let beta = forces::velocity(motion, old.k.rises(i), i);
-        let rkb = old.r[i] * old.k[i] * beta;
+        let length = p.length_of(old.r[i]);
+        let rkb = length * old.k[i] * beta;
         motion.beta[i] = beta;
         motion.rkb[i] = rkb;
-        sums.add(i, [old.r[i], rkb]);
+        sums.add(i, [length, rkb]);
     }
     let [length, mut sum_rkb] = sums.totals();
     if branches.law.is_forced() {
@@ -45,17 +46,17 @@ pub fn redistribute<N: Number>(
         tangential_velocity(old, p, [mean_rkb, mean_length], blocks, motion);
         for i in 0..old.len() {
             let rate = p.omega * (mean_length * motion.ir[i] - N::of(1.0)) - mean_rkb;
-            r[i] = old.r[i] * (p.tau * rate).exponential();
+            r[i] = grown(old.r[i], p.tau * rate, p);
         }
     } else {
         for i in 0..old.len() {
             motion.alpha[i] = N::of(0.0);
-            r[i] = old.r[i] * (-(p.tau * (old.k[i] * motion.beta[i]))).exponential();
+            r[i] = grown(old.r[i], -(p.tau * (old.k[i] * motion.beta[i])), p);
         }
     }
     motion.alpha.close();
     r.close();
-    reciprocals(r, motion);
+    reciprocals(r, p, motion);
     length
 }
 
@@ -70,22 +71,38 @@ fn tangential_velocity<N: Number>(
 ) {
     let mut sum = Sums::new(blocks);
     for i in 0..old.len() {
-        let r = old.r[i];
+        let r = p.length_of(old.r[i]);
         sum.add(i, [motion.rkb[i] - r * mean_rkb + p.omega * (mean_length - r)]);
         [motion.alpha[i]] = sum.so_far();
     }
     motion.alpha[old.len() - 1] = N::of(0.0);
 }
 
-/// Computes `1/r` and `1/q` from one division, `1/(r q)`, since both are of the same size.
+/// Returns what is stored of a length that grows by the factor `e^growth`.
 #[inline(always)]
-fn reciprocals<N: Number>(r: &Ring<N>, motion: &mut Motion<N>) {
+fn grown<N: Number>(stored: N, growth: N, p: &Parameters<N>) -> N {
+    let length = p.length_of(stored);
+    if N::IS_SHORT {
+        stored + length * growth.exponential_less_one()
+    } else {
+        length * growth.exponential() - p.r_offset
+    }
+}
+
+/// Computes `1/r` and `1/q` from one division, `1/(r q)`, since both are of the same size. In short numbers each by
+/// itself: neighbours must see the same `1/r`, to the last bit, and in the kernel not all see q.
+#[inline(always)]
+fn reciprocals<N: Number>(r: &Ring<N>, p: &Parameters<N>, motion: &mut Motion<N>) {
     for i in 0..r.len() {
         let [_, _, own, next, _] = r.window(i);
+        let (own, next) = (p.length_of(own), p.length_of(next));
         let q = (own + next) * N::of(0.5);
+        if N::IS_SHORT {
+            (motion.ir[i], motion.iq[i]) = (own.recip(), q.recip());
+            continue;
+        }
         let inverse = (own * q).recip();
-        motion.ir[i] = inverse * q;
-        motion.iq[i] = inverse * own;
+        (motion.ir[i], motion.iq[i]) = (inverse * q, inverse * own);
     }
     motion.ir.close();
     motion.iq.close();

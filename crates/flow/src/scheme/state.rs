@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 
-use super::law::Law;
+use super::{Parameters, law::Law};
 use crate::{
     number::{Number, Real},
     solver::{Blocks, Memory, Ring, Solves, refinement::Remainder},
@@ -38,7 +38,7 @@ pub struct Curve<N> {
     pub y: Ring<N>,
     /// Curvature on the segment that ends at the node.
     pub k: Ring<N>,
-    /// Length of that segment, as the scheme evolves it.
+    /// Length of that segment, as the scheme evolves it, less [`Parameters::r_offset`].
     pub r: Ring<N>,
 }
 
@@ -246,9 +246,19 @@ impl<N: Number> State<N> {
 }
 
 impl<T: Real> State<T> {
-    /// Creates the state before the first step.
+    /// Creates the state before the first step, with whole lengths.
     pub fn from_nodes(nodes: &[DVec2]) -> State<T> {
         State::starting(Curve::from_nodes(nodes))
+    }
+
+    /// Creates the state before the first step, with lengths less `r_offset`.
+    pub fn with_offset(nodes: &[DVec2], r_offset: T) -> State<T> {
+        let mut curve = Curve::from_nodes(nodes);
+        for i in 0..nodes.len() {
+            curve.r[i] = curve.r[i] - r_offset;
+        }
+        curve.r.close();
+        State::starting(curve)
     }
 
     /// Returns all fields one after another: [`STATE_FIELDS`] numbers for each node.
@@ -340,6 +350,8 @@ pub struct Workspace<N> {
     pub by: [Ring<N>; 2],
     /// The gradients of the new curve's area and length, x and y of each, where they are kept.
     pub gradients: [Ring<N>; 4],
+    /// How often solutions are refined, where they are.
+    pub refinements: N,
     /// Whether to fill the rows of the systems even if the solver does not need them.
     pub traced: bool,
 }
@@ -391,8 +403,17 @@ impl<N: Number> Workspace<N> {
             of_position: Remainder::zeros(if N::IS_SHORT { n } else { 0 }),
             by: std::array::from_fn(|_| ring()),
             gradients: std::array::from_fn(|_| ring()),
+            refinements: N::of(1.0),
             traced: false,
         }
+    }
+}
+
+impl<N: Number> Parameters<N> {
+    /// Returns the length of a segment, of which `stored` is in the state.
+    #[inline(always)]
+    pub fn length_of(&self, stored: N) -> N {
+        stored + self.r_offset
     }
 }
 

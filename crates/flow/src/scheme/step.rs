@@ -102,7 +102,8 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, traced } = work;
+    let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, .. } = work;
+    let (refinements, traced) = (work.refinements, work.traced);
     let refined = branches.is_refined::<N, S>();
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
@@ -114,10 +115,11 @@ pub fn step_by<N: Number, S: Solves>(
         sor: p.sor,
         max_sweeps: method.max_sweeps,
         order: method.order,
+        refinements,
     };
 
     let equations = Curvature::new(old, new, motion, p);
-    if *traced {
+    if traced {
         curvature.system.assemble(&equations);
     }
     let (unknown, remainder) = ([&mut increments.k], refined.then_some(of_curvature));
@@ -128,7 +130,7 @@ pub fn step_by<N: Number, S: Solves>(
         forces::measure(old, motion);
     }
     let equations = Position::new(old, new, motion, p, branches);
-    if *traced {
+    if traced {
         position.system.assemble(&equations);
     }
     let control = Control { negligible: rounding * radius, ..control };

@@ -70,7 +70,7 @@ mod tests {
     use crate::solver::{direct, system::tests::test_system};
 
     fn control(order: Order, sor: f64) -> Control<f64> {
-        Control { tolerance: 1e-12, negligible: 0.0, sor, max_sweeps: 100_000, order }
+        Control { tolerance: 1e-12, negligible: 0.0, sor, max_sweeps: 100_000, order, refinements: 0.0 }
     }
 
     fn worst_difference(order: Order, sor: f64, n: usize) -> f64 {

@@ -10,14 +10,6 @@ use super::{
 };
 use crate::number::{Mask, Number};
 
-/// Nodes above which a solution is refined twice.
-pub const ONCE: usize = 200;
-
-/// How often a solution with n nodes is refined.
-pub const fn refinements(n: usize) -> u32 {
-    if n > ONCE { 2 } else { 1 }
-}
-
 /// What a solution leaves of the right-hand sides, and what it lacks.
 #[derive(Clone, Debug)]
 pub struct Remainder<N, const F: usize> {
@@ -68,7 +60,13 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
 ) -> Swept<N> {
     let mut all = S::solve(equations, unknown.each_mut().map(|u| &mut **u), memory, blocks, control, live);
     let Some(Remainder { left, lacks }) = remainder else { return all };
-    for _ in 0..refinements(blocks.n) {
+    let mut made = N::of(0.0);
+    loop {
+        let live = live.and(control.refinements.le(made).not());
+        if !live.any() {
+            return all;
+        }
+        made += N::of(1.0);
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
             for f in 0..F {
@@ -77,14 +75,13 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
         }
         let remaining = Remaining { of: equations, left };
         let swept = S::solve(&remaining, lacks.each_mut(), memory, blocks, control, live);
-        all.converged = all.converged.and(swept.converged);
-        all.finite = all.finite.and(swept.finite);
+        all.converged = all.converged.and(swept.converged.or(live.not()));
+        all.finite = all.finite.and(swept.finite.or(live.not()));
         for f in 0..F {
             for i in 0..blocks.n {
-                unknown[f][i] += lacks[f][i];
+                unknown[f][i] += N::select(live, lacks[f][i], N::of(0.0));
             }
             unknown[f].close();
         }
     }
-    all
 }

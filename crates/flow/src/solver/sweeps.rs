@@ -34,6 +34,8 @@ pub struct Control<N> {
     pub max_sweeps: u32,
     /// Order of a sweep.
     pub order: Order,
+    /// How often a solution is [refined](super::refinement), per lane.
+    pub refinements: N,
 }
 
 /// Result of a solve.

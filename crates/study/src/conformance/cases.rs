@@ -160,6 +160,8 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
                 // One member in seven chooses its own factor.
                 sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
                 polygon_ratio: flow.equilibrium().least_quotient(n),
+                // Three members in five store lengths that are not whole.
+                r_offset: if j % 5 % 2 == 0 { polygon::length(&nodes) / n as f64 } else { 0.0 },
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
                 // Even with few steps, a member leaves points for the fit.
@@ -169,7 +171,7 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
                 growth: if flow.growth(1.0).is_some() { 50.0 } else { 0.0 },
                 ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
-            let mut run = Run::new(State::from_nodes(&nodes), parameters);
+            let mut run = Run::new(State::with_offset(&nodes, parameters.r_offset), parameters);
             run.counters.goal = steps;
             Ok(run)
         })
