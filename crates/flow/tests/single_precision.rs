@@ -22,7 +22,7 @@ use glam::DVec2;
 const ASPECTS: [f64; 4] = [1.05, 1.2, 2.0, 4.0];
 /// Of the median and of the largest difference from f64, by the number of nodes.
 const BOUNDS: [(usize, [f64; 2]); 4] =
-    [(100, [2e-5, 1e-4]), (200, [2e-5, 1e-4]), (320, [5e-5, 2e-4]), (400, [5e-5, 2e-4])];
+    [(100, [1e-5, 5e-5]), (200, [2e-5, 1e-4]), (320, [5e-5, 2e-4]), (400, [5e-5, 2e-4])];
 
 /// An ellipse with evenly spaced nodes and a semi-minor axis of 1.
 fn ellipse(n: usize, a: f64) -> Vec<DVec2> {
