@@ -26,34 +26,43 @@ fn curvature_equation() {
     let rise = rises(Window(b(wk.low), b(wk.high)));
     let forcing = rise.plus1 * iqh - rise.here * iqm;
     normalise(row_a, row_b, row_c, row_d, row_e, tau * irh);
-    rhs_x = (forcing + rkb * k - stiff_curvature(rises(wk))) * inverse;
+    let by = rises(wk);
+    rhs_x = (forcing + rkb * k - stiff_curvature(by, by)) * inverse;
 }
 
 /// The rows times an unknown of these windows.
 fn curvature_applied(w: Window) -> vec {
-    return (length_of(here(r_new)) * (real(1.0) / tau) - rkb) * here(w) + stiff_curvature(rises(w));
+    let by = rises(w);
+    var weighted_by = by;
+    if CRYSTAL { weighted_by = weighted_rises(w); }
+    return (length_of(here(r_new)) * (real(1.0) / tau) - rkb) * here(w) + stiff_curvature(by, weighted_by);
 }
 
-/// The part of that in which an unknown is seen by its differences, as differences of its second derivative.
-fn stiff_curvature(by: Rises) -> vec {
+/// The part of that in which an unknown u is seen by its differences, as differences of the second derivative of w; w
+/// is u, of a crystal g u.
+fn stiff_curvature(by: Rises, weighted_by: Rises) -> vec {
     let iqm = minus1(iq);
     let iqh = here(iq);
-    let first = rounded(by.here * iqm);
-    let second = rounded(by.plus1 * iqh);
-    let bend_before = rounded((first - rounded(by.minus1 * minus2(iq))) * minus1(ir));
+    let through = conductance();
+    let first = rounded(weighted_by.here * through.minus1);
+    let second = rounded(weighted_by.plus1 * through.here);
+    let bend_before = rounded((first - rounded(weighted_by.minus1 * through.minus2)) * minus1(ir));
     let bend = rounded((second - first) * here(ir));
-    let bend_after = rounded((rounded(by.plus2 * plus1(iq)) - second) * plus1(ir));
+    let bend_after = rounded((rounded(weighted_by.plus2 * through.plus1) - second) * plus1(ir));
     let own = rounded((bend - bend_before) * iqm);
     let next = rounded((bend_after - bend) * iqh);
     let advection = real(0.5) * (alpha_before * by.here + alpha * by.plus1);
     return (next - own) - advection;
 }
 
+/// The rises of g u.
+fn weighted_rises(w: Window) -> Rises {
+    return rises(Window(rounded(stiffness.low * w.low), rounded(stiffness.high * w.high)));
+}
+
 /// The equations of a crystal: the stiff terms are those of w = g k, with M at the nodes.
 fn curvature_of_crystal() {
     let k = here(k_window);
-    let by_k = offsets(k_window);
-    let by = offsets(weighted);
     let through = conductance();
     let irm = minus1(ir);
     let irh = here(ir);
@@ -66,10 +75,10 @@ fn curvature_of_crystal() {
     let row_e = iqh * irp * through.plus1;
     let row_b = -(through.minus1 * (irh * iqh + iqm * (irh + irm)) + row_a);
     let row_d = -(through.here * (irh * iqm + iqh * (irh + irp)) + row_e);
-    let stiff = row_a * by.minus2 + row_b * by.minus1 + row_d * by.plus1 + row_e * by.plus2;
+    let stiff = stiff_curvature(rises(k_window), rises(weighted));
     let rate = real(1.0) / tau;
     let row_c = (length_of(here(r_new)) * rate - rkb) - (before - after) - (row_a + row_b + row_d + row_e) * here(stiffness);
-    let rhs = rkb * k - stiff - (before * by_k.minus1 - after * by_k.plus1);
+    let rhs = rkb * k - stiff;
     normalise(
         row_a * minus2(stiffness), row_b * minus1(stiffness) + before, row_c, row_d * plus1(stiffness) - after,
         row_e * plus2(stiffness), tau * irh,

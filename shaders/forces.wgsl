@@ -204,10 +204,11 @@ fn velocity(k: vec, wk: Window) -> vec {
     return b(k) - (rise.plus1 * here(iq) - rise.here * minus1(iq)) * here(ir);
 }
 
-/// M/q at the nodes i-2 ... i+1 of a crystal.
+/// M/q at the nodes i-2 ... i+1, with M = 1 but for a crystal.
 struct Conductance { minus2: vec, minus1: vec, here: vec, plus1: vec }
 
 fn conductance() -> Conductance {
+    if !CRYSTAL { return Conductance(minus2(iq), minus1(iq), here(iq), plus1(iq)); }
     return Conductance(
         minus2(mobile_there) * minus2(iq), minus1(mobile_there) * minus1(iq), here(mobile_there) * here(iq),
         plus1(mobile_there) * plus1(iq),

@@ -14,6 +14,9 @@ const ROOT_TERMS = 5u;
 const NEAR = 4.0;
 /// The place of 4π, or 4|W|, in the law.
 const QUOTIENT = 22u;
+/// The place of what an edge of a crystal is compared with: the energy of one at rest, twice its share of the area, and
+/// by how much their quotient exceeds the least one.
+const AT_REST = 29u;
 
 /// Whether the excess and its derivatives are computed by the regular polygon next to the curve.
 fn is_by_polygon() -> bool {
@@ -88,7 +91,8 @@ fn quotient(length: real, area: real) -> real {
 }
 
 /// The regular polygon next to the new curve, with which it is compared node by node where numbers are short: its
-/// centre c, the factor G of ωⁱ in its nodes and that in its unit tangents, the length of its edges, its area.
+/// centre c, the factor G of ωⁱ in its nodes and that in its unit tangents, the length of its edges, its area, of a
+/// crystal that at rest.
 struct Regular { centre: vec2<real>, radius: vec2<real>, tangent: vec2<real>, edge: real, area: real }
 var<private> regular: Regular;
 
@@ -102,7 +106,9 @@ fn regular_near(x: vec, y: vec) -> Regular {
     let cosine = real(HALF_COSINE);
     let sine = real(HALF_SINE);
     let tangent = vec2(along.x * sine - along.y * cosine, along.x * cosine + along.y * sine);
-    return Regular(all.xy, all.zw, tangent, (sine + sine) * size, real(NODES) * (sine * cosine) * (size * size));
+    var share = (sine * cosine) * (size * size);
+    if CRYSTAL { share = real(0.5) * all_parameters[member].law[AT_REST + 1u]; }
+    return Regular(all.xy, all.zw, tangent, (sine + sine) * size, real(NODES) * share);
 }
 
 /// L', L'', 2A' and 2A'' in units of a length that grows as the polygon would.
@@ -154,7 +160,8 @@ fn regular_changes() -> vec {
 }
 
 /// By how much the length of an edge exceeds its own part along the polygon's, and `d_{i-1} × d_i` of the differences d
-/// from the polygon's nodes; in long numbers the length of the edge and `x_{i-1} × x_i`.
+/// from the polygon's nodes, of a crystal by how much `(x_i - c) × e_i` exceeds that at rest; in long numbers the
+/// length of the edge and `x_{i-1} × x_i`.
 struct Exceeded { longer: vec, more: vec }
 
 fn exceeded(wx: Window, wy: Window, own: Edge) -> Exceeded {
@@ -165,17 +172,28 @@ fn exceeded(wx: Window, wy: Window, own: Edge) -> Exceeded {
     let along = tangents.x * own.x + tangents.y * own.y;
     let across = tangents.x * own.y - tangents.y * own.x;
     let longer = select(across * across / (own.length + along), own.length - along, along <= vec(0.0));
-    let dx = coordinate(here(wx)) - vec(regular.centre.x) - nodes.x;
-    let dy = coordinate(here(wy)) - vec(regular.centre.y) - nodes.y;
+    let x = coordinate(here(wx)) - vec(regular.centre.x);
+    let y = coordinate(here(wy)) - vec(regular.centre.y);
+    if CRYSTAL { return Exceeded(longer, (x * own.y - y * own.x) - vec(all_parameters[member].law[AT_REST + 1u])); }
+    let dx = x - nodes.x;
+    let dy = y - nodes.y;
     let more = dx * (own.y - regular.edge * tangents.y) - dy * (own.x - regular.edge * tangents.x);
     return Exceeded(longer, more);
 }
 
 /// The distance from equilibrium by the sums of that.
-fn excess(longer: real, more: real) -> real {
+fn excess(longer: real, more: real, dearer: real) -> real {
     let p = &all_parameters[member];
     let plain = quotient(total_tension(), sums.y) - p.polygon_ratio;
-    if !is_by_polygon() { return plain; }
+    if !IS_SHORT { return plain; }
+    if CRYSTAL {
+        let energy_at_rest = real(NODES) * p.law[AT_REST];
+        let known = !(sums.y <= real(0.0) || energy_at_rest <= real(0.0));
+        let energy = dearer / energy_at_rest;
+        let wider = real(0.5) * more / regular.area;
+        let over = (p.law[AT_REST + 2u] + energy * (real(2.0) + energy)) - wider;
+        return select(plain, p.polygon_ratio * over / (real(1.0) + wider), known);
+    }
     let own = real(NODES) * regular.edge;
     let unit = p.law[QUOTIENT];
     let over = longer * (own + own + longer) - p.polygon_ratio * unit * (real(0.5) * more);
@@ -294,7 +312,7 @@ fn observe(wx: Window, wy: Window, kh: vec, stored: vec, moved: vec) {
     let own = edge(x.here, y.here).length;
     var energy = vec(0.0);
     if CRYSTAL {
-        energy = tension(tangent_of(edge(x.here, y.here))).energy * own;
+        energy = tension(tangent_of(edge(x.here, y.here))).energy * own - vec(all_parameters[member].law[AT_REST]);
     } else {
         energy = energy_density(kh) * rh;
         if FORCED && all_parameters[member].law[CONSERVED] > real(0.0) {
@@ -320,9 +338,10 @@ fn observe(wx: Window, wy: Window, kh: vec, stored: vec, moved: vec) {
     let all = ring_summary(part, extremes_of_block, others_of_block);
     let length = real(NODES) * regular.edge + all.sums.x;
     sums = vec(length, regular.area + real(0.5) * all.sums.y, all.sums.zw);
+    if CRYSTAL { sums.z = real(NODES) * all_parameters[member].law[AT_REST] + all.sums.z; }
     extremes = all.extremes;
     others = all.others;
-    distance = excess(all.sums.x, all.sums.y);
+    distance = excess(all.sums.x, all.sums.y, all.sums.z);
 }
 
 /// Derives the observables from the last `observe`.

@@ -119,14 +119,6 @@ fn window(of_before: vec, own: vec, of_after: vec) -> Window {
     return Window(vec(tail, own.xy), high);
 }
 
-/// By how much a field exceeds its value at i, at i-2, i-1, i+1, i+2.
-struct Offsets { minus2: vec, minus1: vec, plus1: vec, plus2: vec }
-
-fn offsets(w: Window) -> Offsets {
-    let at = here(w);
-    return Offsets(minus2(w) - at, minus1(w) - at, plus1(w) - at, plus2(w) - at);
-}
-
 /// How much a field at i-1, i, i+1, i+2 exceeds its value at the node before.
 struct Rises { minus1: vec, here: vec, plus1: vec, plus2: vec }
 

@@ -5,7 +5,7 @@
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
 /// Whether solutions are refined.
-const REFINED = IS_SHORT && ADAPTIVE && !SWEEPS && !CRYSTAL;
+const REFINED = IS_SHORT && ADAPTIVE && !SWEEPS;
 
 /// The new curve, with the windows of its nodes.
 var<private> new_k: vec;
@@ -27,6 +27,7 @@ fn forget() {
     iq = Window();
     stiffness = Window();
     weighted = Window();
+    weights = Weights();
     mobile_there = Window();
     rkb = vec();
     alpha = vec();

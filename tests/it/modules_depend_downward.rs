@@ -14,7 +14,7 @@ use syn::{
 };
 
 /// Crates and modules; each may use only those above it. A name stands for what has no longer one; `program` for `src`.
-const LAYERS: [&str; 47] = [
+const LAYERS: [&str; 50] = [
     "shaders",
     "base/error",
     "base/guard",
@@ -32,6 +32,9 @@ const LAYERS: [&str; 47] = [
     "flow/solver",
     "flow/scheme",
     "flow",
+    "vectors",
+    "vectors-f32",
+    "vectors-f64",
     "backend",
     "gpu",
     "curve",

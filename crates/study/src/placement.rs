@@ -233,14 +233,10 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
 /// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
 fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
     // What is measured is the rounding of steps whose solves are refined; levels beside fixed steps are such.
-    let (by_sweeps, crystals) = (spec.adaptive.is_some() && spec.solver().sweeps(), spec.has_crystals());
-    if precision == Precision::F32 && spec.refine && (by_sweeps || crystals) {
-        let (of, remedy) = match crystals {
-            true => ("of crystals", "use --precision f64 --backend cpu"),
-            false => ("by sweeps", "use --solver direct, or --precision f64"),
-        };
-        let problem = format!("the rounding of solves {of} in f32 is larger than the errors that it is to tell");
-        return Err(Error::value("refine", true, &problem, remedy));
+    let by_sweeps = spec.adaptive.is_some() && spec.solver().sweeps();
+    if precision == Precision::F32 && spec.refine && by_sweeps {
+        let problem = "the rounding of solves by sweeps in f32 is larger than the errors that it is to tell";
+        return Err(Error::value("refine", true, problem, "use --solver direct, or --precision f64"));
     }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");

@@ -176,12 +176,16 @@ fn columns(arguments: &str, backend: &str, precision: Precision, names: [&str; 2
 
 /// Whole adaptive runs: what the GPU computes in f32 is within 5e-4 of what the CPU does in f64. Limits of an ellipse
 /// and of one that is nearly a circle are within their own errors, too. The times are of curves that are nearly
-/// circles and not pulled, where products that neighbours do not see alike change them by up to 1e-2.
+/// circles and not pulled, where products that neighbours do not see alike change them by up to 1e-2, and of crystals.
 pub(super) fn f32_is_that_of_the_cpu_in_f64(_: &Gpu, _: Solver, n: usize) -> Outcome {
     let limits = format!("--accurate --shape ellipse:choice(1.05,2),1 --amplitude 0.02 --modes 2..=5 --points {n}");
     let circles = "--shape circle:1 --amplitude 0.03 --decay 2 --flow willmore --adaptive=1e-4";
     let times = format!("{circles} --t-end auto --stop-when-relaxed --points {n}");
-    for (what, arguments, names) in [("limits", limits, ["t_limit", "t_error"]), ("times", times, ["t_relax", "t_end"])]
+    let crystals = "--shape ellipse:1.3,1 --amplitude 0.03 --energy cos:4,0.03 --diffusivity cos:2,0.2 --adaptive=1e-4";
+    let of_crystals = format!("{crystals} --t-end auto --stop-when-relaxed --points {n}");
+    let names = ["t_relax", "t_end"];
+    for (what, arguments, names) in
+        [("limits", limits, ["t_limit", "t_error"]), ("times", times, names), ("times of crystals", of_crystals, names)]
     {
         let short = columns(&arguments, "gpu", Precision::F32, names)?;
         let long = columns(&arguments, "cpu", Precision::F64, names)?;

@@ -4,9 +4,7 @@
 //! Every call regroups the running members, so that no lane stays idle for long. A member's results do not depend on
 //! its group, to the last bit. There are two batches of slots: while threads advance one, the host handles the other.
 
-mod vectors;
-
-pub use vectors::{Vectorised, Vectors};
+pub use curvelax_vectors::Vectors;
 
 use std::{
     sync::{
@@ -26,15 +24,15 @@ use curvelax_base::{
 use curvelax_flow::{
     scheme::{
         Parameters, State,
-        evolve::Group,
+        evolve::Evolves,
         member::{Counters, Report},
-        run::Run,
+        run::{Group, Run},
         state::STATE_FIELDS,
         step::Method,
     },
     solver::{Blocks, Solver},
 };
-use vectors::Workers;
+use curvelax_vectors::Workers;
 
 /// Resident groups per thread and batch: enough that threads finish together, few enough that members finish in order.
 const GROUPS_PER_THREAD: usize = 4;
@@ -66,6 +64,25 @@ pub struct CpuBackend<T> {
     time: Duration,
 }
 
+/// A number with vector code.
+pub trait Vectorised: Evolves {
+    /// Creates workers of `threads` threads for rings cut by `blocks`; none if the processor lacks the vectors.
+    #[doc(hidden)]
+    fn workers(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Option<Box<dyn Workers<Self>>>;
+}
+
+impl Vectorised for f64 {
+    fn workers(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Option<Box<dyn Workers<f64>>> {
+        curvelax_vectors_f64::workers(vectors, solver, blocks, threads)
+    }
+}
+
+impl Vectorised for f32 {
+    fn workers(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Option<Box<dyn Workers<f32>>> {
+        curvelax_vectors_f32::workers(vectors, solver, blocks, threads)
+    }
+}
+
 /// The members in one part of the slots.
 type Members<T> = Vec<Option<Box<Run<T>>>>;
 
@@ -91,7 +108,7 @@ impl<T: Vectorised> CpuBackend<T> {
     /// Like [`CpuBackend::new`], for `members` members: with vectors no wider than the members fill and than memory
     /// allows.
     pub fn for_members(blocks: Blocks, method: Method, threads: usize, members: u64) -> Result<Self> {
-        let workers = |vectors: &Vectors| Some((*vectors, T::workers(*vectors, method.solver, blocks, 1).ok()?));
+        let workers = |vectors: &Vectors| Some((*vectors, T::workers(*vectors, method.solver, blocks, 1)?));
         let crews: Vec<_> = Vectors::ALL.iter().filter(|vectors| vectors.are_available()).filter_map(workers).collect();
         let fits = crews.iter().filter(|(_, workers)| workers.bytes_of_team() <= ROOM);
         let most = fits.map(|(_, workers)| workers.lanes()).max().unwrap_or(1);
@@ -106,7 +123,8 @@ impl<T: Vectorised> CpuBackend<T> {
         // A panic shows as a batch that does not come back.
         let pool = threads::pool(threads)?;
         let threads = pool.current_num_threads();
-        let workers = T::workers(vectors, method.solver, blocks, threads)?;
+        let none = || Error::Failed(format!("this processor has no vectors of {vectors:?}"));
+        let workers = T::workers(vectors, method.solver, blocks, threads).ok_or_else(none)?;
         let of_member = STATE_FIELDS * blocks.n * size_of::<T>();
         let batches = if BATCHES * workers.lanes() * of_member <= ROOM { BATCHES } else { 1 };
         let usual = SLOTS_PER_THREAD.max(GROUPS_PER_THREAD * workers.lanes());

@@ -9,6 +9,8 @@ use curvelax_statistics::{Limit, Times};
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
 const OF_STEPS: f64 = 5e-5;
 const OF_NODES: f64 = 6.0;
+/// Of the excess of a crystal, which is compared with one at rest by energy and area, in units of ε over the excess.
+const OF_ENERGY: f64 = 0.1;
 /// How much larger they are in the geometric form.
 const OF_GEOMETRIC: f64 = 3.0;
 
@@ -75,7 +77,8 @@ impl Ladder {
         }
         let tolerance = tolerance(spec);
         let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
-        let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess)).collect();
+        let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
+        let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
         let levels = times;
         Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess }))
     }
@@ -209,9 +212,10 @@ fn turn(spec: &Spec, at: &AtLevel) -> f64 {
 
 /// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit). The root
 /// of the excess is about the amplitude.
-fn rounding(precision: Precision, excess: f64) -> f64 {
+fn rounding(precision: Precision, excess: f64, energy: f64) -> f64 {
+    let epsilon = precision.epsilon();
     match precision {
-        Precision::F32 => OF_STEPS.hypot(OF_NODES * precision.epsilon() / excess.sqrt()),
+        Precision::F32 => OF_STEPS.hypot(OF_NODES * epsilon / excess.sqrt()).hypot(energy * epsilon / excess),
         Precision::F64 => 0.0,
     }
 }

@@ -57,7 +57,7 @@ impl<'a> Trajectory<'a> {
         let mut parameters =
             parameters(spec, (&flow, &forcing), &nodes, [unit, time_unit], spec.tolerance_at(precision));
         if precision == Precision::F32 {
-            parameters.r_offset = (polygon::length(&nodes) / nodes.len() as f64) as f32 as f64;
+            parameters.compare_with(&nodes);
         }
         let mut launch = Run::new(State::with_offset(&nodes, parameters.r_offset), parameters);
         launch.counters.order =

@@ -16,10 +16,16 @@ const RESOLUTION: f64 = 128.0;
 /// The same in f32, where it is computed by the differences from a regular polygon: there the nodes are rounded by some
 /// 1/300 of the amplitude of the shape.
 const RESOLUTION_SHORT: f64 = 1.0;
+/// The same of crystals in f32, whose energies and areas are compared with those at rest.
+const RESOLUTION_OF_CRYSTALS: f64 = 16.0;
 
 /// An excess below which a threshold lies in the rounding of the precision.
 pub(super) fn resolution(precision: Precision, is_crystal: bool) -> f64 {
-    let multiple = if precision == Precision::F32 && !is_crystal { RESOLUTION_SHORT } else { RESOLUTION };
+    let multiple = match (precision, is_crystal) {
+        (Precision::F64, _) => RESOLUTION,
+        (Precision::F32, false) => RESOLUTION_SHORT,
+        (Precision::F32, true) => RESOLUTION_OF_CRYSTALS,
+    };
     multiple * precision.epsilon()
 }
 

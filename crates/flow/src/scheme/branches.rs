@@ -2,7 +2,7 @@
 //!
 //! Members in the lanes of a number are advanced by one stream of instructions. Masks select what differs from lane to
 //! lane; what decides which instructions are run at all is here, and nowhere else. Branches are read only from the
-//! parameters of single members, compared by [`Group`](super::evolve::Group), and passed to the stages: no stage asks a
+//! parameters of single members, compared by [`Group`](super::run::Group), and passed to the stages: no stage asks a
 //! number of several lanes which branch to take.
 
 use super::{Parameters, law::Kind};
@@ -32,7 +32,7 @@ impl Branches {
     /// Returns whether solutions are refined: those of adaptive steps in f32 by the direct solver. Fixed steps are off
     /// by more, and sweeps stop at their tolerance.
     pub fn is_refined<N: Number, S: Solves>(&self) -> bool {
-        N::IS_SHORT && self.adaptive && !S::FACTS.sweeps && !self.law.is_crystal()
+        N::IS_SHORT && self.adaptive && !S::FACTS.sweeps
     }
 }
 

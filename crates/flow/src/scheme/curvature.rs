@@ -53,37 +53,51 @@ impl<N: Number> Equations<N, 1> for Curvature<'_, N> {
         let d = -(half * alpha) - (middle + high + e);
         let c = (r * self.rate - rkb) - (a + b + d + e);
         let forcing = rise_of_bp * iq - rise_of_b * iqm;
-        let stiff = self.stiff_curvature(i, self.old.k.rises(i));
+        let rises = self.old.k.rises(i);
+        let stiff = self.stiff_curvature(i, rises, rises);
         Equation { a, b, c, d, e, rhs: [forcing + rkb * self.old.k[i] - stiff], time_over_length: self.p.tau * ir }
     }
 
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
         let own = self.p.length_of(self.new.r[i]) * self.rate - self.motion.rkb[i];
-        own * unknown[i] + self.stiff_curvature(i, unknown.rises(i))
+        let rises = unknown.rises(i);
+        let weighted = if self.motion.law.kind.is_crystal() { self.weighted_rises(i, unknown) } else { rises };
+        own * unknown[i] + self.stiff_curvature(i, rises, weighted)
     }
 }
 
 impl<N: Number> Curvature<'_, N> {
-    /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
+    /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u and of w, as differences of `∂²w`; w is u, of a
+    /// crystal g u.
     #[inline(always)]
-    fn stiff_curvature(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
+    fn stiff_curvature(&self, i: usize, [_, here, after, _]: [N; 4], weighted: [N; 4]) -> N {
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
-        let [iqmm, iqm, iq, iqp, _] = self.motion.iq.window(i);
+        let [_, iqm, iq, _, _] = self.motion.iq.window(i);
+        let [pmm, pm, p, pp, _] = forces::conductance(self.motion, i);
         let [_, alpha_m, alpha, _, _] = self.motion.alpha.window(i);
-        let (first, second) = ((here * iqm).rounded(), (after * iq).rounded());
-        let bend_before = ((first - (before * iqmm).rounded()) * irm).rounded();
+        let [rise_before, rise, rise_after, rise_last] = weighted;
+        let (first, second) = ((rise * pm).rounded(), (rise_after * p).rounded());
+        let bend_before = ((first - (rise_before * pmm).rounded()) * irm).rounded();
         let bend = ((second - first) * ir).rounded();
-        let bend_after = (((last * iqp).rounded() - second) * irp).rounded();
+        let bend_after = (((rise_last * pp).rounded() - second) * irp).rounded();
         let (own, next) = (((bend - bend_before) * iqm).rounded(), ((bend_after - bend) * iq).rounded());
         (next - own) - N::of(0.5) * (alpha_m * here + alpha * after)
+    }
+
+    /// The [rises](Ring::rises) of g u.
+    #[inline(always)]
+    fn weighted_rises(&self, i: usize, unknown: &Ring<N>) -> [N; 4] {
+        let (g, mut all) = (self.motion.stiffness.window(i), unknown.window(i));
+        for j in 0..5 {
+            all[j] = (g[j] * all[j]).rounded();
+        }
+        [all[1] - all[0], all[2] - all[1], all[3] - all[2], all[4] - all[3]]
     }
 
     /// The equation of a crystal.
     #[inline(always)]
     fn of_crystal(&self, i: usize) -> Equation<N, 1> {
-        let [_, km, kp, _] = self.old.k.offsets(i);
-        let [wmm, wm, wp, wpp] = self.motion.weighted.offsets(i);
         let [gmm, gm, g, gp, gpp] = self.motion.stiffness.window(i);
         let [_, irm, ir, irp, _] = self.motion.ir.window(i);
         let [_, iqm, iq, _, _] = self.motion.iq.window(i);
@@ -96,9 +110,9 @@ impl<N: Number> Curvature<'_, N> {
         let e = iq * irp * pp;
         let b = -(pm * (ir * iq + iqm * (ir + irm)) + a);
         let d = -(p * (ir * iqm + iq * (ir + irp)) + e);
-        let stiff = a * wmm + b * wm + d * wp + e * wpp;
+        let stiff = self.stiff_curvature(i, self.old.k.rises(i), self.motion.weighted.rises(i));
         let c = (r * self.rate - rkb) - (before - after) - (a + b + d + e) * g;
-        let rhs = rkb * self.old.k[i] - stiff - (before * km - after * kp);
+        let rhs = rkb * self.old.k[i] - stiff;
         let (a, b, d, e) = (a * gmm, b * gm + before, d * gp - after, e * gpp);
         Equation { a, b, c, d, e, rhs: [rhs], time_over_length: self.p.tau * ir }
     }

@@ -12,7 +12,7 @@ use super::{
     member::{Counters, NEVER, Observed},
     observe::{self, Glance},
     pace::{self, Allowed, Stride},
-    run::Run,
+    run::{Group, Run},
     start,
     state::{self, CURVE_FIELDS, INCREMENT_FIELDS, LASTING_FIELDS, STATE_FIELDS},
     step::{self, Method, Stepped, Steps},
@@ -21,23 +21,6 @@ use crate::{
     number::{Mask, Number, Real, ln_ratio},
     solver::{Blocks, Solves, by_solver},
 };
-
-/// Members that take the same branches of the scheme, and so can run side by side.
-pub struct Group<'a, 'b, T> {
-    runs: &'a mut [&'b mut Run<T>],
-    branches: Branches,
-}
-
-impl<'a, 'b, T: Real> Group<'a, 'b, T> {
-    /// Sorts members into groups of at most `most`.
-    pub fn of(runs: &'a mut [&'b mut Run<T>], most: usize) -> Vec<Group<'a, 'b, T>> {
-        let branches = |run: &Run<T>| run.parameters.branches();
-        runs.sort_by_key(|run| branches(run));
-        let alike = runs.chunk_by_mut(|one, other| branches(one) == branches(other));
-        let groups = alike.flat_map(|alike| alike.chunks_mut(most));
-        groups.map(|runs| Group { branches: branches(runs[0]), runs }).collect()
-    }
-}
 
 /// Members side by side, one per lane.
 pub struct Team<N: Number> {
@@ -233,9 +216,11 @@ impl<N: Number> Team<N> {
                 self.strides[lane] = pace::stride(&run.report.progress, &run.parameters);
                 h.set_lane(lane, self.strides[lane].length);
                 orders.set_lane(lane, N::Real::of(f64::from(run.counters.order)));
-                let (length, n) = (run.report.now.length, N::Real::of(self.work.blocks.n as f64));
-                let refinements = pace::refinements(self.strides[lane].length, length, n);
-                self.work.refinements.set_lane(lane, N::Real::of(f64::from(refinements)));
+                if N::IS_SHORT {
+                    let (length, n) = (run.report.now.length, N::Real::of(self.work.blocks.n as f64));
+                    let refinements = pace::refinements(self.strides[lane].length, length, n);
+                    self.work.refinements.set_lane(lane, N::Real::of(f64::from(refinements)));
+                }
                 if live.lane(lane) {
                     most = run.counters.order.max(most);
                 }

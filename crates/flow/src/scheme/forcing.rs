@@ -34,8 +34,8 @@ use crate::{
 /// Rounds of a correction. Each divides what is left by a thousand or more: the first takes an error of the step, the
 /// last one that of rounding.
 pub const ROUNDS: usize = 4;
-/// -φ of the position equation where forces act, in units of `(2π/L)²`: the least that is stable for all modes of a
-/// circle in steps of any length and order.
+/// -φ of the position equation where forces act, in units of `(2π/L)²`: the least whole number that is stable for all
+/// modes of a circle in steps of any length and order.
 pub const DAMPING: f64 = 4.0;
 
 impl Kind {

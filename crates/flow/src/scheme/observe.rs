@@ -4,6 +4,8 @@
 //! Length, area and turning number are those of the polygon x; the energy uses the scheme's k and r. Of a crystal,
 //! energy and excess are those of the polygon, by the directions of its edges.
 
+use glam::DVec2;
+
 use super::{
     Curve, Parameters,
     dense::LOOKS,
@@ -15,6 +17,7 @@ use super::{
 };
 use crate::{
     flow::QUOTIENT,
+    forcing::KEPT_LENGTH,
     number::{BIG, Mask, Number, Real},
     solver::{self, Blocks},
 };
@@ -34,6 +37,12 @@ pub const ROOT_TERMS: u32 = 5;
 /// Excess at the end of an adaptive step, as a multiple of a threshold, above which nobody looks for a dip below the
 /// threshold inside the step.
 pub const NEAR: f64 = 4.0;
+
+/// The place of what f32 compares the edges of a crystal with: the energy of an edge of the Wulff shape of the area at
+/// the start, twice its share of that area, and by how much their quotient exceeds the least one, as a share of it.
+///
+/// The sums are then of differences, which rounding harms less than the energy and the area themselves.
+pub const AT_REST: usize = KEPT_LENGTH + 1;
 
 /// Whether the excess of a curve under this law, and its derivatives, are computed by the [`Regular`] polygon next to
 /// it: no differences of numbers near 1, whose rounding would be more than they are.
@@ -107,7 +116,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
     let low = N::of(-2.0 * BIG);
     let (mut turn, mut slack, mut minus_shortest, mut minus_k_min, mut farthest) = (low, low, low, low, N::of(0.0));
     let mut sums = solver::Sums::new(blocks);
-    let regular = Regular::near(new, blocks);
+    let regular = Regular::near(new, p, kind, blocks);
     for i in 0..new.len() {
         let (k, r, e) = (new.k[i], p.length_of(new.r[i]), edge(new, i)[2]);
         turn = turn.max((k * r).bounded_abs());
@@ -116,13 +125,14 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
         minus_k_min = minus_k_min.max(-k);
         let (dx, dy) = (N::apart(old.x[i], new.x[i]), N::apart(old.y[i], new.y[i]));
         farthest = farthest.max((dx * dx + dy * dy).bounded_abs());
-        let [longer, more] = regular.exceeded(new, i);
+        let [longer, more] = regular.exceeded(new, i, p, kind);
         sums.add(i, [longer, more, winding(new, i)]);
     }
     let [longer, more, turning] = sums.totals();
     let [length, area] = regular.sizes([longer, more]);
-    let tension = tension(new, length, &p.law(kind), blocks);
-    let excess = regular.excess([longer, more], [tension, area], p, kind);
+    let dearer = dearer(new, p, kind, blocks);
+    let tension = regular.tension(length, dearer, p, kind);
+    let excess = regular.excess([longer, more, dearer], [tension, area], p, kind);
     let farthest = farthest.sqrt();
     Glance { length, tension, area, excess, turning, turn, slack, minus_shortest, minus_k_min, farthest, regular }
 }
@@ -149,20 +159,21 @@ impl<N: Number> Glance<N> {
     }
 }
 
-/// `Σ γ |e_i|` of a curve of this length.
+/// By how much `Σ γ |e_i|` of a crystal exceeds that [at rest](AT_REST).
 #[inline(always)]
-fn tension<N: Number>(curve: &Curve<N>, length: N, law: &Law<N>, blocks: Blocks) -> N {
-    if !law.kind.is_crystal() {
-        return length;
+fn dearer<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> N {
+    if !kind.is_crystal() {
+        return N::of(0.0);
     }
+    let law = p.law(kind);
     let mut sum = solver::Sums::new(blocks);
     for i in 0..curve.len() {
         let edge = edge(curve, i);
         let [gamma, ..] = law.tension(forces::tangent_of(edge));
-        sum.add(i, [gamma * edge[2]]);
+        sum.add(i, [gamma * edge[2] - p.law[AT_REST]]);
     }
-    let [tension] = sum.totals();
-    tension
+    let [dearer] = sum.totals();
+    dearer
 }
 
 /// Coordinates of the nodes i-1 and i: both x, then both y.
@@ -187,22 +198,22 @@ pub fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
 #[inline(always)]
 pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> CurveSums<N> {
     let mut sums = solver::Sums::new(blocks);
-    let regular = Regular::near(curve, blocks);
+    let regular = Regular::near(curve, p, kind, blocks);
     for i in 0..curve.len() {
         let k = curve.k[i];
         let energy = match kind.conserved {
             0 => p.energy_density(k) * p.length_of(curve.r[i]),
             _ => p.energy_at_vertex(edge(curve, i), edge(curve, (i + 1) % curve.len())),
         };
-        let [longer, more] = regular.exceeded(curve, i);
+        let [longer, more] = regular.exceeded(curve, i, p, kind);
         sums.add(i, [longer, more, energy, winding(curve, i)]);
     }
     let [longer, more, energy, turning] = sums.totals();
     let [length, area] = regular.sizes([longer, more]);
-    let law = p.law(kind);
-    let tension = tension(curve, length, &law, blocks);
-    let energy = if kind.is_crystal() { law.unit * tension } else { energy };
-    let excess = regular.excess([longer, more], [tension, area], p, kind);
+    let dearer = dearer(curve, p, kind, blocks);
+    let tension = regular.tension(length, dearer, p, kind);
+    let energy = if kind.is_crystal() { p.law(kind).unit * tension } else { energy };
+    let excess = regular.excess([longer, more, dearer], [tension, area], p, kind);
     CurveSums { length, area, energy, turning, tension, excess }
 }
 
@@ -246,14 +257,14 @@ pub struct Regular<N> {
     tangent: [N; 2],
     /// |E|; 0 in f64.
     edge: N,
-    /// Area.
+    /// Area; of a crystal that [at rest](AT_REST).
     area: N,
 }
 
 impl<N: Number> Regular<N> {
     /// The polygon next to `curve`.
     #[inline(always)]
-    fn near(curve: &Curve<N>, blocks: Blocks) -> Regular<N> {
+    fn near(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: Blocks) -> Regular<N> {
         let (n, zero) = (curve.len(), N::of(0.0));
         let nodes = N::of(n as f64);
         if !N::IS_SHORT {
@@ -277,7 +288,8 @@ impl<N: Number> Regular<N> {
             radius: [re, im],
             tangent: [tx * sine - ty * cosine, tx * cosine + ty * sine],
             edge: (sine + sine) * size,
-            area: nodes * (sine * cosine) * (size * size),
+            area: nodes
+                * if kind.is_crystal() { N::of(0.5) * p.law[AT_REST + 1] } else { (sine * cosine) * (size * size) },
         }
     }
 
@@ -319,10 +331,10 @@ impl<N: Number> Regular<N> {
         sums.totals()
     }
 
-    /// By how much the length of edge i exceeds its own part along T, and `d_{i-1} × d_i`; in f64 the length of the
-    /// edge and `x_{i-1} × x_i`.
+    /// By how much the length of edge i exceeds its own part along T, and `d_{i-1} × d_i`, of a crystal by how much
+    /// `(x_i - c) × e_i` exceeds that at rest; in f64 the length of the edge and `x_{i-1} × x_i`.
     #[inline(always)]
-    fn exceeded(&self, curve: &Curve<N>, i: usize) -> [N; 2] {
+    fn exceeded(&self, curve: &Curve<N>, i: usize, p: &Parameters<N>, kind: Kind) -> [N; 2] {
         let [ex, ey, e] = edge(curve, i);
         if !N::IS_SHORT {
             return [e, cross(curve, i)];
@@ -331,9 +343,13 @@ impl<N: Number> Regular<N> {
         let [tx, ty] = turned(self.tangent, root);
         let (along, across) = (tx * ex + ty * ey, tx * ey - ty * ex);
         let longer = N::select(along.le(N::of(0.0)), e - along, across * across / (e + along));
+        let x = N::coordinate(curve.x[i]) - self.centre[0];
+        let y = N::coordinate(curve.y[i]) - self.centre[1];
+        if kind.is_crystal() {
+            return [longer, (x * ey - y * ex) - p.law[AT_REST + 1]];
+        }
         let [px, py] = turned(self.radius, root);
-        let dx = N::coordinate(curve.x[i]) - self.centre[0] - px;
-        let dy = N::coordinate(curve.y[i]) - self.centre[1] - py;
+        let (dx, dy) = (x - px, y - py);
         [longer, dx * (ey - self.edge * ty) - dy * (ex - self.edge * tx)]
     }
 
@@ -343,17 +359,50 @@ impl<N: Number> Regular<N> {
         [self.nodes * self.edge + longer, self.area + N::of(0.5) * more]
     }
 
+    /// `Σ γ |e_i|`, for γ = 1 the length.
+    #[inline(always)]
+    fn tension(&self, length: N, dearer: N, p: &Parameters<N>, kind: Kind) -> N {
+        if kind.is_crystal() { self.nodes * p.law[AT_REST] + dearer } else { length }
+    }
+
     /// The distance from equilibrium: the quotient minus that of the polygon at equilibrium.
     #[inline(always)]
-    fn excess(&self, [longer, more]: [N; 2], [tension, area]: [N; 2], p: &Parameters<N>, kind: Kind) -> N {
+    fn excess(&self, [longer, more, dearer]: [N; 3], [tension, area]: [N; 2], p: &Parameters<N>, kind: Kind) -> N {
         let plain = quotient(tension, area, p) - p.polygon_ratio;
-        if !is_by_polygon::<N>(kind) {
+        if !N::IS_SHORT {
             return plain;
+        }
+        if kind.is_crystal() {
+            let energy_at_rest = self.nodes * p.law[AT_REST];
+            let known = area.le(N::of(0.0)).or(energy_at_rest.le(N::of(0.0))).not();
+            let energy = dearer / energy_at_rest;
+            let wider = N::of(0.5) * more / self.area;
+            let over = (p.law[AT_REST + 2] + energy * (N::of(2.0) + energy)) - wider;
+            return N::select(known, p.polygon_ratio * over / (N::of(1.0) + wider), plain);
         }
         let (own, unit) = (self.nodes * self.edge, p.law[QUOTIENT]);
         let over = longer * (own + own + longer) - p.polygon_ratio * unit * (N::of(0.5) * more);
         // Of a curve that runs clockwise the area counts by its size.
         N::select(area.le(N::of(0.0)), plain, over / (unit * area))
+    }
+}
+
+impl Parameters<f64> {
+    /// Sets what f32 compares a member that starts at `nodes` with: the mean length of its edges, and what a crystal's
+    /// are [at rest](AT_REST).
+    pub fn compare_with(&mut self, nodes: &[DVec2]) {
+        let (n, edges) = (nodes.len() as f64, nodes.iter().zip(nodes.iter().cycle().skip(1)));
+        let short = |number: f64| f64::from(number as f32);
+        self.r_offset = short(edges.clone().map(|(from, to)| from.distance(*to)).sum::<f64>() / n);
+        if !self.kind_of_law().is_crystal() {
+            return;
+        }
+        let area = 0.5 * edges.map(|(from, to)| from.perp_dot(*to)).sum::<f64>().abs();
+        let energy = (self.polygon_ratio * self.law[QUOTIENT] * area).sqrt();
+        let [energy, area] = [short(energy / n), short(2.0 * area / n)];
+        let quotient = quotient(n * energy, 0.5 * n * area, self);
+        [self.law[AT_REST], self.law[AT_REST + 1]] = [energy, area];
+        self.law[AT_REST + 2] = quotient / self.polygon_ratio - 1.0;
     }
 }
 

@@ -42,14 +42,19 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
     #[inline(always)]
     fn equation(&self, i: usize) -> Equation<N, 2> {
         let (q, iq) = (self.dual_length(i), self.motion.iq[i]);
-        let off = if self.motion.law.kind.is_crystal() { self.of_crystal(i) } else { self.of_paper(i) };
+        let weights = self.weights(i);
+        let off = if self.motion.law.kind.is_crystal() {
+            self.row_of_crystal(i, weights)
+        } else {
+            self.row_of_paper(i, weights)
+        };
         let [a, b, d, e] = off;
         let c = q * self.rate - (a + b + d + e);
         let rhs = match self.geometric {
             true => forces::of_polygon(self.old, self.motion, i),
             false => [
-                -self.stiff_position(i, self.old.x.rises_of_places(i)),
-                -self.stiff_position(i, self.old.y.rises_of_places(i)),
+                -self.stiff_position(i, self.old.x.rises_of_places(i), weights),
+                -self.stiff_position(i, self.old.y.rises_of_places(i), weights),
             ],
         };
         Equation { a, b, c, d, e, rhs, time_over_length: self.p.tau * iq }
@@ -57,26 +62,34 @@ impl<N: Number> Equations<N, 2> for Position<'_, N> {
 
     #[inline(always)]
     fn applied(&self, i: usize, unknown: &Ring<N>) -> N {
-        self.dual_length(i) * self.rate * unknown[i] + self.stiff_position(i, unknown.rises(i))
+        self.dual_length(i) * self.rate * unknown[i] + self.stiff_position(i, unknown.rises(i), self.weights(i))
     }
+}
+
+/// What the stiff terms at a node are weighted by.
+#[derive(Clone, Copy)]
+struct Weights<N> {
+    /// Of the bends at the node before, there and at the node after.
+    bends: [N; 3],
+    /// Of the differences of those on the two segments.
+    rises: [N; 2],
+    /// φ, or what stands for it where forces act.
+    phi: N,
+    drift: N,
 }
 
 impl<N: Number> Position<'_, N> {
     /// `Σ_j off_ij (u_j - u_i)` for the [rises](Ring::rises) of u, as differences of `∂²u`.
     #[inline(always)]
-    fn stiff_position(&self, i: usize, [before, here, after, last]: [N; 4]) -> N {
-        let [_, _, k, kp, _] = self.new.k.window(i);
+    fn stiff_position(&self, i: usize, [before, here, after, last]: [N; 4], weights: Weights<N>) -> N {
         let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
-        let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
-        let half = N::of(0.5);
+        let Weights { bends: [at_before, at, at_after], rises: [own, next], phi, drift } = weights;
         let (slope, slope_after) = ((here * ir).rounded(), (after * irp).rounded());
-        let bend_before = ((slope - (before * irm).rounded()) * iqm).rounded();
+        let bend_before = ((slope - (before * irm).rounded()) * at_before).rounded();
         let rise = slope_after - slope;
-        let bend = (rise * iq).rounded();
-        let bend_after = (((last * irpp).rounded() - slope_after) * iqp).rounded();
-        let stiff = ((bend_after - bend) * irp).rounded() - ((bend - bend_before) * ir).rounded();
-        let phi = self.damped(half * (self.motion.law.phi(k) + self.motion.law.phi(kp)));
-        let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
+        let bend = (rise * at).rounded();
+        let bend_after = (((last * irpp).rounded() - slope_after) * at_after).rounded();
+        let stiff = ((bend_after - bend) * next).rounded() - ((bend - bend_before) * own).rounded();
         stiff + (phi * rise - drift * (here + after))
     }
 
@@ -93,51 +106,69 @@ impl<N: Number> Position<'_, N> {
         if self.motion.law.kind.is_forced() { self.motion.damping } else { phi }
     }
 
-    /// 𝓐, 𝓑, 𝓓 and 𝓔.
     #[inline(always)]
-    fn of_paper(&self, i: usize) -> [N; 4] {
+    fn weights(&self, i: usize) -> Weights<N> {
+        if self.motion.law.kind.is_crystal() { self.weights_of_crystal(i) } else { self.weights_of_paper(i) }
+    }
+
+    #[inline(always)]
+    fn weights_of_paper(&self, i: usize) -> Weights<N> {
         let [_, _, k, kp, _] = self.new.k.window(i);
-        let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
+        let [_, _, ir, irp, _] = self.motion.ir.window(i);
         let [_, iqm, iq, iqp, _] = self.motion.iq.window(i);
         let half = N::of(0.5);
-        let a = ir * iqm * irm;
-        let e = irp * iqp * irpp;
-        let middle = ir * iq * irp;
-        let low = ir * ir * (iqm + iq);
-        let high = irp * irp * (iq + iqp);
         let phi = self.damped(half * (self.motion.law.phi(k) + self.motion.law.phi(kp)));
         let drift = half * self.motion.alpha[i] - N::of(0.75) * (self.new.k.rise_of_square(i) * iq);
-        [a, (phi * ir + drift) - (middle + low + a), (phi * irp - drift) - (middle + high + e), e]
+        Weights { bends: [iqm, iq, iqp], rises: [ir, irp], phi, drift }
     }
 
     /// The same of a crystal, with `φ = M w k` and the drift `½(M ∂w k + ∂(M w k))`.
     #[inline(always)]
-    fn of_crystal(&self, i: usize) -> [N; 4] {
+    fn weights_of_crystal(&self, i: usize) -> Weights<N> {
         let motion = self.motion;
         let [_, _, k, kp, _] = self.new.k.window(i);
         let [_, _, g, gp, _] = motion.stiffness.window(i);
-        let [_, irm, ir, irp, irpp] = motion.ir.window(i);
+        let [_, _, ir, irp, _] = motion.ir.window(i);
         let [_, iqm, iq, iqp, _] = motion.iq.window(i);
         let [_, gm_there, g_there, gp_there, _] = motion.stiffness_there.window(i);
         let half = N::of(0.5);
-        let (before, here, after) = (gm_there * iqm, g_there * iq, gp_there * iqp);
         let (w, wp) = (g * k, gp * kp);
-        let (mut s, mut sp) = (ir, irp);
+        let mut rises = [ir, irp];
         let (mut phi, mut phi_after, mut current) = (w * k, wp * kp, wp - w);
         if motion.law.kind.is_diffusive() {
             let [_, _, mobile, mobile_after, _] = motion.mobile.window(i);
-            (s, sp) = (mobile * ir, mobile_after * irp);
+            rises = [mobile * ir, mobile_after * irp];
             (phi, phi_after) = (mobile * phi, mobile_after * phi_after);
             current = motion.mobile_there[i] * current;
         }
         let mean = self.damped(half * (phi + phi_after));
         let turned = half * ((k + kp) * current) + (phi_after - phi);
         let drift = half * (motion.alpha[i] - turned * iq);
+        Weights { bends: [gm_there * iqm, g_there * iq, gp_there * iqp], rises, phi: mean, drift }
+    }
+
+    /// 𝓐, 𝓑, 𝓓 and 𝓔.
+    #[inline(always)]
+    fn row_of_paper(&self, i: usize, Weights { bends: [iqm, iq, iqp], phi, drift, .. }: Weights<N>) -> [N; 4] {
+        let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
+        let a = ir * iqm * irm;
+        let e = irp * iqp * irpp;
+        let middle = ir * iq * irp;
+        let low = ir * ir * (iqm + iq);
+        let high = irp * irp * (iq + iqp);
+        [a, (phi * ir + drift) - (middle + low + a), (phi * irp - drift) - (middle + high + e), e]
+    }
+
+    /// The same of a crystal.
+    #[inline(always)]
+    fn row_of_crystal(&self, i: usize, weights: Weights<N>) -> [N; 4] {
+        let [_, irm, ir, irp, irpp] = self.motion.ir.window(i);
+        let Weights { bends: [before, here, after], rises: [s, sp], phi, drift } = weights;
         let both = here * (s + sp);
         let a = s * irm * before;
         let e = sp * irpp * after;
-        let b = (mean * ir + drift) - (ir * (both + s * before) + a);
-        let d = (mean * irp - drift) - (irp * (both + sp * after) + e);
+        let b = (phi * ir + drift) - (ir * (both + s * before) + a);
+        let d = (phi * irp - drift) - (irp * (both + sp * after) + e);
         [a, b, d, e]
     }
 }
@@ -149,31 +180,23 @@ mod tests {
     use glam::DVec2;
 
     use super::{
-        super::{State, Workspace, step},
+        super::{State, Workspace, curvature::Curvature, step},
         *,
     };
     use crate::{
+        crystal::Crystal,
         flow::Flow,
         forcing::{Drive, Forcing},
         solver::{Blocks, Solver},
     };
 
+    const NODES: usize = 24;
+
     /// By how much the rows times an unknown differ from what is [applied](Equations::applied) to it, relative to that.
-    fn mismatch(forcing: &Forcing, geometric: bool) -> f64 {
-        let n = 24;
-        let at = |i: usize| TAU * i as f64 / n as f64;
-        let nodes: Vec<DVec2> = (0..n).map(|i| DVec2::from_angle(at(i)) * (1.0 + 0.2 * (3.0 * at(i)).sin())).collect();
-        let mut p =
-            Parameters { geometric: f64::from(u8::from(geometric)), ..Parameters::of_flow(&Flow::Elastic(0.3), 0.1) };
-        forcing.write(&mut p.law, 1.0);
-        let mut state = State::<f64>::from_nodes(&nodes);
-        let mut work = Workspace::new(Blocks::new(n).unwrap());
-        let State { curve, increments, .. } = &mut state;
-        step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
-        let equations = Position::new(curve, &work.new, &work.motion, &p, p.branches());
-        let unknown = Ring::from_nodes((0..n).map(|i| (7.0 * i as f64).sin()));
+    fn mismatch_of<const F: usize>(equations: &impl Equations<f64, F>) -> f64 {
+        let unknown = Ring::from_nodes((0..NODES).map(|i| (7.0 * i as f64).sin()));
         let mut worst = 0.0_f64;
-        for i in 0..n {
+        for i in 0..NODES {
             let [mm, m, own, next, last] = unknown.window(i);
             let Equation { a, b, c, d, e, .. } = equations.equation(i);
             let product = a * mm + b * m + c * own + d * next + e * last;
@@ -182,12 +205,34 @@ mod tests {
         worst
     }
 
+    /// That of the systems for k and for the positions.
+    fn mismatches(flow: &Flow, forcing: &Forcing, geometric: bool) -> [f64; 2] {
+        let n = NODES;
+        let at = |i: usize| TAU * i as f64 / n as f64;
+        let nodes: Vec<DVec2> = (0..n).map(|i| DVec2::from_angle(at(i)) * (1.0 + 0.2 * (3.0 * at(i)).sin())).collect();
+        let mut p = Parameters { geometric: f64::from(u8::from(geometric)), ..Parameters::of_flow(flow, 0.1) };
+        forcing.write(&mut p.law, 1.0);
+        let mut state = State::<f64>::from_nodes(&nodes);
+        let mut work = Workspace::new(Blocks::new(n).unwrap());
+        let State { curve, increments, .. } = &mut state;
+        step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
+        [
+            mismatch_of(&Curvature::new(curve, &work.new, &work.motion, &p)),
+            mismatch_of(&Position::new(curve, &work.new, &work.motion, &p, p.branches())),
+        ]
+    }
+
     #[test]
     fn what_is_applied_to_an_unknown_is_the_matrix() {
         let driven = Forcing { drive: Some(Drive::Constant(0.3)), ..Forcing::default() };
-        for (forcing, geometric) in [(&Forcing::default(), false), (&Forcing::default(), true), (&driven, true)] {
-            let mismatch = mismatch(forcing, geometric);
-            assert!(mismatch < 1e-10, "{forcing:?}: {mismatch:e}");
+        let free = Forcing::default();
+        let waves = Crystal { energy: "cos:4,0.03,5".parse().unwrap(), diffusivity: "cos:2,0.3".parse().unwrap() };
+        let stiff = Crystal { energy: "cos:4,0.03".parse().unwrap(), ..Crystal::default() };
+        let (elastic, crystals) = (Flow::Elastic(0.3), [waves, stiff].map(Flow::Crystal));
+        let plain = [(&elastic, &free, false), (&elastic, &free, true), (&elastic, &driven, true)];
+        for (flow, forcing, geometric) in plain.into_iter().chain(crystals.iter().map(|flow| (flow, &free, true))) {
+            let mismatches = mismatches(flow, forcing, geometric);
+            assert!(mismatches.iter().all(|of| *of < 1e-10), "{flow}, {forcing:?}: {mismatches:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
-//! A member's run between two dispatches, and a step of it.
+//! A member's run between two dispatches, and members that can run side by side.
 
 use super::{
-    Parameters, State,
+    Branches, Parameters, State,
     member::{Counters, NEVER, Report},
     observe,
 };
@@ -9,6 +9,7 @@ use crate::{number::Real, solver::Blocks};
 
 /// Order of the first adaptive step.
 pub const FIRST_ORDER: u32 = 5;
+
 /// One member in progress: everything that a dispatch reads and writes.
 #[derive(Clone, Debug)]
 pub struct Run<T> {
@@ -20,6 +21,25 @@ pub struct Run<T> {
     pub counters: Counters,
     /// Its report; the excess of the last accepted curve is where the next step's events start.
     pub report: Report<T>,
+}
+
+/// Members that take the same branches of the scheme, and so can run side by side.
+pub struct Group<'a, 'b, T> {
+    /// Their runs.
+    pub runs: &'a mut [&'b mut Run<T>],
+    /// Their branches.
+    pub branches: Branches,
+}
+
+impl<'a, 'b, T: Real> Group<'a, 'b, T> {
+    /// Sorts members into groups of at most `most`.
+    pub fn of(runs: &'a mut [&'b mut Run<T>], most: usize) -> Vec<Group<'a, 'b, T>> {
+        let branches = |run: &Run<T>| run.parameters.branches();
+        runs.sort_by_key(|run| branches(run));
+        let alike = runs.chunk_by_mut(|one, other| branches(one) == branches(other));
+        let groups = alike.flat_map(|alike| alike.chunks_mut(most));
+        groups.map(|runs| Group { branches: branches(runs[0]), runs }).collect()
+    }
 }
 
 impl<T: Real> Run<T> {

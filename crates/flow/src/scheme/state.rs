@@ -342,9 +342,9 @@ pub struct Workspace<N> {
     pub curvature: Memory<N, 1>,
     /// The position system and its solver.
     pub position: Memory<N, 2>,
-    /// What a refined curvature lacks.
+    /// What a refined curvature lacks; empty in f64.
     pub of_curvature: Remainder<N, 1>,
-    /// What refined positions lack.
+    /// What refined positions lack; empty in f64.
     pub of_position: Remainder<N, 2>,
     /// How far the nodes of the new curve have moved, where forces move them.
     pub by: [Ring<N>; 2],

@@ -103,8 +103,8 @@ pub fn step_by<N: Number, S: Solves>(
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
     let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, .. } = work;
-    let (refinements, traced) = (work.refinements, work.traced);
-    let refined = branches.is_refined::<N, S>();
+    let (refined, traced) = (branches.is_refined::<N, S>(), work.traced);
+    let refinements = if refined { work.refinements } else { N::of(0.0) };
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.
     let radius = length * N::of(0.5 / std::f64::consts::PI);
@@ -122,8 +122,8 @@ pub fn step_by<N: Number, S: Solves>(
     if traced {
         curvature.system.assemble(&equations);
     }
-    let (unknown, remainder) = ([&mut increments.k], refined.then_some(of_curvature));
-    let for_k = refinement::solve::<N, S, 1>(&equations, unknown, curvature, remainder, *blocks, &control, live);
+    let unknown = [&mut increments.k];
+    let for_k = refinement::solve::<N, S, 1>(&equations, unknown, curvature, of_curvature, *blocks, &control, live);
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -134,8 +134,8 @@ pub fn step_by<N: Number, S: Solves>(
         position.system.assemble(&equations);
     }
     let control = Control { negligible: rounding * radius, ..control };
-    let (unknowns, remainder) = ([&mut increments.x, &mut increments.y], refined.then_some(of_position));
-    let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, remainder, *blocks, &control, live);
+    let unknowns = [&mut increments.x, &mut increments.y];
+    let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, of_position, *blocks, &control, live);
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);

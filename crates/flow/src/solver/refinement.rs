@@ -47,30 +47,32 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     }
 }
 
-/// Solves `equations` and refines the solution, if there is room for what it leaves.
+/// Solves `equations`, and in short numbers refines the solution of a direct solver as often as `control` says.
+///
+/// The first solve is one for what zero lacks, so that the body of a solve is compiled once: it takes most of the time
+/// of the compiler.
 #[inline(always)]
 pub fn solve<N: Number, S: Solves, const F: usize>(
     equations: &impl Equations<N, F>,
-    mut unknown: [&mut Ring<N>; F],
+    unknown: [&mut Ring<N>; F],
     memory: &mut Memory<N, F>,
-    remainder: Option<&mut Remainder<N, F>>,
+    remainder: &mut Remainder<N, F>,
     blocks: Blocks,
     control: &Control<N>,
     live: N::Mask,
 ) -> Swept<N> {
-    let mut all = S::solve(equations, unknown.each_mut().map(|u| &mut **u), memory, blocks, control, live);
-    let Some(Remainder { left, lacks }) = remainder else { return all };
-    let mut made = N::of(0.0);
+    if !N::IS_SHORT || S::FACTS.sweeps {
+        return S::solve(equations, unknown, memory, blocks, control, live);
+    }
+    let Remainder { left, lacks } = remainder;
+    let (mut live, mut round) = (live, N::of(0.0));
+    let mut all = Swept { sweeps: N::of(0.0), converged: live, finite: live };
+    let mut first = true;
     loop {
-        let live = live.and(control.refinements.le(made).not());
-        if !live.any() {
-            return all;
-        }
-        made += N::of(1.0);
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
             for f in 0..F {
-                left[f][i] = rhs[f] - equations.applied(i, unknown[f]);
+                left[f][i] = if first { rhs[f] } else { rhs[f] - equations.applied(i, unknown[f]) };
             }
         }
         let remaining = Remaining { of: equations, left };
@@ -79,9 +81,16 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
         all.finite = all.finite.and(swept.finite.or(live.not()));
         for f in 0..F {
             for i in 0..blocks.n {
-                unknown[f][i] += N::select(live, lacks[f][i], N::of(0.0));
+                let solved = if first { lacks[f][i] } else { unknown[f][i] + lacks[f][i] };
+                unknown[f][i] = N::select(live, solved, unknown[f][i]);
             }
             unknown[f].close();
         }
+        live = live.and(all.converged).and(control.refinements.le(round).not());
+        if !live.any() {
+            return all;
+        }
+        round += N::of(1.0);
+        first = false;
     }
 }

@@ -163,13 +163,6 @@ impl<N: Number> Ring<N> {
         [w[0], w[1], w[2], w[3], w[4]]
     }
 
-    /// Returns by how much the values at `i-2, i-1, i+1, i+2` exceed the one at i.
-    #[inline(always)]
-    pub fn offsets(&self, i: usize) -> [N; 4] {
-        let [mm, m, x, p, pp] = self.window(i);
-        [mm - x, m - x, p - x, pp - x]
-    }
-
     /// Returns how much the values at `i-1, i, i+1, i+2` exceed those of the nodes before them.
     #[inline(always)]
     pub fn rises(&self, i: usize) -> [N; 4] {
@@ -269,7 +262,6 @@ mod tests {
         let ring = Ring::from_nodes((0..7).map(f64::from));
         assert_eq!(ring.window(0), [5.0, 6.0, 0.0, 1.0, 2.0]);
         assert_eq!(ring.window(6), [4.0, 5.0, 6.0, 0.0, 1.0]);
-        assert_eq!(ring.offsets(6), [-2.0, -1.0, -6.0, -5.0]);
         assert_eq!(ring.rises(6), [1.0, 1.0, -6.0, 1.0]);
         assert_eq!([ring.rise_of_square(2), ring.rise_of_square(6)], [5.0, -36.0]);
     }

@@ -106,6 +106,9 @@ fn become_crystal(run: &mut Run<f64>, [energy, diffusivity]: [&str; 2]) {
     p.law = flow.law(1.0);
     p.polygon_ratio = flow.equilibrium().least_quotient(n);
     p.growth = 0.0;
+    if p.r_offset > 0.0 {
+        p.compare_with(&run.state.curve.positions().collect::<Vec<_>>());
+    }
     let now = Run::new(run.state.clone(), *p).report.now;
     (run.report.before, run.report.now) = (now, now);
     (p.relax_at, p.half_at) = (0.9 * now.excess, 0.95 * now.excess);
@@ -151,7 +154,7 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
             let nodes = family.member(j as u64)?.nodes;
             let flow = &flows[j % LAWS];
             let excess = flow.equilibrium().excess(polygon::length(&nodes), polygon::signed_area(&nodes), n);
-            let parameters = Parameters {
+            let mut parameters = Parameters {
                 omega: 1.0 + j as f64,
                 redistribution: if j % UNDISTRIBUTED == 3 { 0.0 } else { 1.0 },
                 // One member in three is pulled.
@@ -160,8 +163,6 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
                 // One member in seven chooses its own factor.
                 sor: if j % 7 == 5 { 0.0 } else { 1.0 + 0.07 * (j % 10) as f64 },
                 polygon_ratio: flow.equilibrium().least_quotient(n),
-                // Three members in five store lengths that are not whole.
-                r_offset: if j % 5 % 2 == 0 { polygon::length(&nodes) / n as f64 } else { 0.0 },
                 relax_at: 0.9 * excess,
                 half_at: 0.95 * excess,
                 // Even with few steps, a member leaves points for the fit.
@@ -171,6 +172,10 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
                 growth: if flow.growth(1.0).is_some() { 50.0 } else { 0.0 },
                 ..Parameters::of_flow(flow, tau(n) * (1.0 - 0.05 * j as f64))
             };
+            // Three members in five store lengths that are not whole.
+            if j % 5 % 2 == 0 {
+                parameters.compare_with(&nodes);
+            }
             let mut run = Run::new(State::with_offset(&nodes, parameters.r_offset), parameters);
             run.counters.goal = steps;
             Ok(run)

@@ -1,22 +1,24 @@
 //! Vector instructions, chosen at run time: the same source, compiled once for each set.
+//!
+//! Nothing is compiled here. `curvelax-vectors-f32` and `curvelax-vectors-f64` do that for a precision each, at the
+//! same time, since it takes minutes.
 
 use std::{marker::PhantomData, sync::Mutex};
 
 use pulp::{NullaryFnOnce, Simd};
 
-use curvelax_base::error::{Error, Result};
 use curvelax_flow::{
     number::{Element, Instructions, Number, Real, WithLanes, with_lanes},
     scheme::{
-        evolve::{Evolves, Group, Team, evolve_abreast},
+        evolve::{Team, evolve_abreast},
+        run::Group,
         step::Method,
     },
     solver::{Blocks, Solver, Solves, by_solver},
 };
 
-/// Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of the vector code. Tests in
-/// this library would take as long to compile it again; tests/it/vectors.rs compares it with one member at a time.
-const WITHOUT_VECTORS: bool = cfg!(any(fuzzing, test));
+/// Fuzzing (`fuzz/run`) advances no member, and would take minutes to count the branches of the vector code.
+const WITHOUT_VECTORS: bool = cfg!(fuzzing);
 
 /// Vector instructions for members side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,35 +63,18 @@ impl Vectors {
     }
 }
 
-/// A number with vector code. Implemented for each number by name, so that the code is compiled once, here, and not in
-/// every program that uses a back end.
-pub trait Vectorised: Evolves {
-    /// Creates a workers of `threads` threads for rings cut by `blocks`.
-    #[doc(hidden)]
-    fn workers(vectors: Vectors, solver: Solver, blocks: Blocks, threads: usize) -> Result<Box<dyn Workers<Self>>>;
+/// Creates workers of `threads` threads for rings cut by `blocks`; none if the processor lacks the vectors.
+#[inline(always)]
+pub fn workers<T: Lane>(
+    vectors: Vectors,
+    solver: Solver,
+    blocks: Blocks,
+    threads: usize,
+) -> Option<Box<dyn Workers<T>>> {
+    by_solver!(solver, S => workers_by::<S, T>(vectors, blocks, threads))
 }
 
-macro_rules! vectorised {
-    ($($real:ident)*) => {
-        $(
-            impl Vectorised for $real {
-                fn workers(
-                    vectors: Vectors,
-                    solver: Solver,
-                    blocks: Blocks,
-                    threads: usize,
-                ) -> Result<Box<dyn Workers<$real>>> {
-                    let workers = by_solver!(solver, S => workers_by::<S, $real>(vectors, blocks, threads));
-                    workers.ok_or_else(|| Error::Failed(format!("this processor has no vectors of {vectors:?}")))
-                }
-            }
-        )*
-    };
-}
-
-vectorised!(f64 f32);
-
-/// Creates a workers for the solver `M` if the processor has the vectors.
+/// Creates workers for the solver `M` if the processor has the vectors.
 ///
 /// An elimination is a chain of dependent results, so two of the smaller registers are interleaved. Sweeps have no such
 /// chain, and visit their rows so often that these must stay in the nearest cache, so fewer members run side by side.
@@ -114,7 +99,7 @@ fn workers_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usi
     }
 }
 
-/// Creates a workers whose members fill `R` registers of the instructions, if the processor has them.
+/// Creates workers whose members fill `R` registers of the instructions, if the processor has them.
 fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd: Option<S>,
     blocks: Blocks,
@@ -124,7 +109,7 @@ fn abreast<S: Instructions, M: Solves, T: Element<S>, const R: usize>(
     simd.map(|simd| with_lanes::<S, T, R, _>(simd, Abreast { simd, solver, blocks, threads }))
 }
 
-/// Everything that defines a workers, except its lanes.
+/// Everything that defines workers, except their lanes.
 struct Abreast<S, M> {
     simd: S,
     solver: PhantomData<fn() -> M>,
@@ -142,18 +127,18 @@ impl<S: Simd, M: Solves, T: Real> WithLanes<T> for Abreast<S, M> {
 
 /// A number that fits all vectors of this processor architecture.
 #[cfg(target_arch = "x86_64")]
-trait Lane: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
+pub trait Lane: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
 #[cfg(target_arch = "x86_64")]
 impl<T: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4>> Lane for T {}
+/// A number that fits all vectors of this processor architecture.
 #[cfg(target_arch = "aarch64")]
-trait Lane: Element<pulp::aarch64::Neon> {}
+pub trait Lane: Element<pulp::aarch64::Neon> {}
 #[cfg(target_arch = "aarch64")]
 impl<T: Element<pulp::aarch64::Neon>> Lane for T {}
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-use Real as Lane;
+pub use Real as Lane;
 
 /// Threads that advance groups of members.
-#[doc(hidden)]
 pub trait Workers<T>: Send + Sync {
     /// Returns the number of members side by side in a group.
     fn lanes(&self) -> usize;
