@@ -136,7 +136,7 @@ pub trait Lane: Element<pulp::aarch64::Neon> {}
 #[cfg(target_arch = "aarch64")]
 impl<T: Element<pulp::aarch64::Neon>> Lane for T {}
 #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-pub use Real as Lane;
+pub use curvelax_flow::number::Real as Lane;
 
 /// Threads that advance groups of members.
 pub trait Workers<T>: Send + Sync {
