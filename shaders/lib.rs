@@ -22,6 +22,7 @@ files! {
     DENSE "dense.wgsl",
     DIRECT "direct.wgsl",
     EVOLVE "evolve.wgsl",
+    EXCESS "excess.wgsl",
     EXCHANGE "exchange.wgsl",
     EXCHANGE_SUBGROUP "exchange_subgroup.wgsl",
     EXTRAPOLATION "extrapolation.wgsl",

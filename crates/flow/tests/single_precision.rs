@@ -455,7 +455,8 @@ mod fast_math {
     }
 
     /// The median and the largest error of ellipses under some flows against f64, and the largest beyond what the steps
-    /// of f64 themselves leave: where rounding makes a member take another step, it differs by a part of that.
+    /// of f64 themselves leave: where rounding makes a member take another step, as at 400 nodes, it differs by a part of
+    /// that.
     fn errors_of<const HELD: bool>(n: usize, geometric: bool, aspects: &[f64], flows: &[Flow]) -> [f64; 3] {
         let (mut all, mut most) = (Vec::new(), f64::NEG_INFINITY);
         for aspect in aspects {
@@ -483,7 +484,8 @@ mod fast_math {
     fn times_by_fast_mathematics_are_those_in_f64() {
         for (n, bounds) in BOUNDS {
             for geometric in [true, false] {
-                let [median, _, worst] = errors_of::<true>(n, geometric, &ASPECTS, &plain_flows());
+                let [median, largest, beyond] = errors_of::<true>(n, geometric, &ASPECTS, &plain_flows());
+                let worst = if n < 400 { largest } else { beyond };
                 // Twice as much: processors have other instructions, and rounding may add a step.
                 let [of_median, of_worst] = bounds.map(|bound| 2.0 * bound);
                 assert!(median < of_median && worst < of_worst, "n = {n}: {median:e} {worst:e}");
@@ -500,15 +502,15 @@ mod fast_math {
         assert!(merged[0] > 10.0 * held[0] && merged[1] > 3.0 * held[1], "{held:?} {merged:?}");
     }
 
-    /// The control: what a sum of two numbers loses, which the next sums could make up for.
     #[test]
     fn times_of_crystals_by_fast_mathematics_are_those_in_f64() {
         for (n, bounds) in &BOUNDS[..2] {
-            let [median, _, worst] = errors_of::<true>(*n, true, &ASPECTS_OF_CRYSTALS, &crystals());
+            let [median, worst, _] = errors_of::<true>(*n, true, &ASPECTS_OF_CRYSTALS, &crystals());
             assert!(median < 2.0 * bounds[0] && worst < 2.0 * bounds[1], "n = {n}: {median:e} {worst:e}");
         }
     }
 
+    /// The control: what a sum of two numbers loses, which the next sums could make up for.
     #[test]
     fn what_a_sum_loses_cannot_be_told_by_fast_mathematics() {
         fn lost<N: Number>(a: N, b: N) -> N {

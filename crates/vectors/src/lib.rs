@@ -25,7 +25,8 @@ const WITHOUT_VECTORS: bool = cfg!(fuzzing);
 pub enum Vectors {
     /// One member at a time: the reference.
     None,
-    /// 128 bits: SSE4.2 on x86-64, NEON on aarch64.
+    /// 128 bits: NEON on aarch64. Those of x86-64 are left out: processors with no wider ones are rare, and the code
+    /// takes minutes to compile.
     Bits128,
     /// 256 bits: AVX2.
     Bits256,
@@ -43,7 +44,7 @@ impl Vectors {
         match self {
             Vectors::None => true,
             _ if WITHOUT_VECTORS => false,
-            Vectors::Bits128 => pulp::x86::V2::is_available(),
+            Vectors::Bits128 => false,
             Vectors::Bits256 => pulp::x86::V3::is_available(),
             Vectors::Bits512 => pulp::x86::V4::is_available(),
         }
@@ -82,10 +83,6 @@ fn workers_by<M: Solves, T: Lane>(vectors: Vectors, blocks: Blocks, threads: usi
     match vectors {
         Vectors::None => Some(VectorWorkers::<_, M, T>::workers(pulp::Scalar::new(), blocks, threads)),
         _ if WITHOUT_VECTORS => None,
-        #[cfg(target_arch = "x86_64")]
-        Vectors::Bits128 if M::FACTS.sweeps => abreast::<_, M, T, 1>(pulp::x86::V2::try_new(), blocks, threads),
-        #[cfg(target_arch = "x86_64")]
-        Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::x86::V2::try_new(), blocks, threads),
         #[cfg(target_arch = "aarch64")]
         Vectors::Bits128 => abreast::<_, M, T, 2>(pulp::aarch64::Neon::try_new(), blocks, threads),
         #[cfg(target_arch = "x86_64")]
@@ -127,9 +124,9 @@ impl<S: Simd, M: Solves, T: Real> WithLanes<T> for Abreast<S, M> {
 
 /// A number that fits all vectors of this processor architecture.
 #[cfg(target_arch = "x86_64")]
-pub trait Lane: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
+pub trait Lane: Element<pulp::x86::V3> + Element<pulp::x86::V4> {}
 #[cfg(target_arch = "x86_64")]
-impl<T: Element<pulp::x86::V2> + Element<pulp::x86::V3> + Element<pulp::x86::V4>> Lane for T {}
+impl<T: Element<pulp::x86::V3> + Element<pulp::x86::V4>> Lane for T {}
 /// A number that fits all vectors of this processor architecture.
 #[cfg(target_arch = "aarch64")]
 pub trait Lane: Element<pulp::aarch64::Neon> {}

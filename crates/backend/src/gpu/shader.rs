@@ -2,7 +2,7 @@
 
 use curvelax_flow::{
     number::Real,
-    scheme::observe::half_angle,
+    scheme::excess::half_angle,
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -66,7 +66,7 @@ impl Variant {
     }
 }
 
-const COMMON: [ShaderPart; 19] = [
+const COMMON: [ShaderPart; 20] = [
     shaders::RING,
     shaders::SUMS,
     shaders::MEMBER,
@@ -78,6 +78,7 @@ const COMMON: [ShaderPart; 19] = [
     shaders::CURVATURE,
     shaders::POSITION,
     shaders::PULL,
+    shaders::EXCESS,
     shaders::OBSERVE,
     shaders::STEP,
     shaders::START,

@@ -62,7 +62,7 @@ macro_rules! instructions {
 }
 
 #[cfg(target_arch = "x86_64")]
-instructions!(pulp::x86::V2: To16 16, pulp::x86::V3: To32 32, pulp::x86::V4: To64 64);
+instructions!(pulp::x86::V3: To32 32, pulp::x86::V4: To64 64);
 #[cfg(target_arch = "aarch64")]
 instructions!(pulp::aarch64::Neon: To16 16);
 
@@ -481,11 +481,7 @@ mod tests {
     #[test]
     fn every_operation_on_lanes_is_that_on_one_number_in_each() {
         #[cfg(target_arch = "x86_64")]
-        let compared = [
-            every_operation(pulp::x86::V2::try_new()),
-            every_operation(pulp::x86::V3::try_new()),
-            every_operation(pulp::x86::V4::try_new()),
-        ];
+        let compared = [every_operation(pulp::x86::V3::try_new()), every_operation(pulp::x86::V4::try_new())];
         #[cfg(target_arch = "aarch64")]
         let compared = [every_operation(pulp::aarch64::Neon::try_new())];
         println!("lanes compared, by instructions: {compared:?}");

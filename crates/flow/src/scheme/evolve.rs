@@ -7,6 +7,7 @@
 use super::{
     Branches, Parameters, State, Status, Workspace, decay,
     dense::{Arc, Fall, LOOKS, RESOLVED, Taken},
+    excess,
     extrapolation::{self, AllShares, SHARED_PARTS},
     forcing,
     member::{Counters, NEVER, Observed},
@@ -447,7 +448,7 @@ fn taken<T: Real>(
         return Taken { h: T::of(0.0), before, after, fall: Fall::Straight, gap };
     }
     let h = stride.length;
-    let exact = observe::is_by_polygon::<T>(run.parameters.kind_of_law());
+    let exact = excess::is_by_polygon::<T>(run.parameters.kind_of_law());
     Taken { h, before, after, fall: Fall::of(&run.report.progress, h, [before, after], decline, exact), gap }
 }
 
@@ -557,7 +558,7 @@ fn aim_at_relaxation<T: Real>(run: &mut Run<T>, before: T, excess: T) {
     let Run { parameters: p, counters, report, .. } = run;
     let progress = &mut report.progress;
     progress.aim = T::of(0.0);
-    let by_polygon = observe::is_by_polygon::<T>(p.kind_of_law());
+    let by_polygon = excess::is_by_polygon::<T>(p.kind_of_law());
     let resolved = by_polygon || T::of(RESOLVED * T::EPSILON).le((excess * progress.slope).abs());
     let is_ahead = counters.relax_step == NEVER && !excess.le(p.relax_at) && !p.relax_at.le(T::of(0.0));
     if is_ahead && (resolved || T::IS_SHORT) {

@@ -179,7 +179,7 @@ fn balanced<N: Number>([area_kept, length_kept]: [N; 2], [aa, ab, bb]: [N; 3], [
 fn sizes<N: Number>(curve: &Curve<N>, blocks: Blocks) -> [N; 2] {
     let mut sums = Sums::new(blocks);
     for i in 0..curve.len() {
-        sums.add(i, [super::observe::cross(curve, i), edge(curve, i)[2]]);
+        sums.add(i, [super::excess::cross(curve, i), edge(curve, i)[2]]);
     }
     let [twice, length] = sums.totals();
     [N::of(0.5) * twice, length]

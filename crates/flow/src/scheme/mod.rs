@@ -28,6 +28,7 @@ pub mod curvature;
 pub mod decay;
 pub mod dense;
 pub mod evolve;
+pub mod excess;
 pub mod extrapolation;
 pub mod forces;
 pub mod forcing;

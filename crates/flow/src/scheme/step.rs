@@ -103,7 +103,9 @@ pub fn step_by<N: Number, S: Solves>(
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
     let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, .. } = work;
-    let (refined, traced) = (branches.is_refined::<N, S>(), work.traced);
+    let refined = branches.is_refined::<N, S>();
+    // Not compiled for members side by side, which nobody traces.
+    let traced = N::LANES == 1 && work.traced;
     let refinements = if refined { work.refinements } else { N::of(0.0) };
     let length = redistribution::redistribute(old, p, branches, *blocks, motion, &mut new.r);
     // Curvature and position are rounded relative to the radius of the circle of this length.

@@ -74,7 +74,9 @@ fn eliminate<N: Number, const F: usize>(
     let zero = N::of(0.0);
     let none = Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] };
     let (mut above2, mut above1) = (none, none);
-    let mut last = [equations.equation(core); 2];
+    // Filled by the loop, in which the body of an equation is compiled once.
+    let mut last =
+        [Equation { a: zero, b: zero, c: zero, d: zero, e: zero, rhs: [zero; F], time_over_length: zero }; 2];
     for i in 0..core + 2 {
         let mut own = equations.equation(i);
         if i >= core {

@@ -59,16 +59,16 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
     remainder: &mut Remainder<N, F>,
     blocks: Blocks,
     control: &Control<N>,
-    live: N::Mask,
+    mut live: N::Mask,
 ) -> Swept<N> {
     if !N::IS_SHORT || S::FACTS.sweeps {
         return S::solve(equations, unknown, memory, blocks, control, live);
     }
     let Remainder { left, lacks } = remainder;
-    let (mut live, mut round) = (live, N::of(0.0));
     let mut all = Swept { sweeps: N::of(0.0), converged: live, finite: live };
-    let mut first = true;
+    let mut made = 0;
     loop {
+        let first = made == 0;
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
             for f in 0..F {
@@ -86,11 +86,10 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
             }
             unknown[f].close();
         }
-        live = live.and(all.converged).and(control.refinements.le(round).not());
+        live = live.and(all.converged).and(control.refinements.le(N::of(f64::from(made))).not());
         if !live.any() {
             return all;
         }
-        round += N::of(1.0);
-        first = false;
+        made += 1;
     }
 }

@@ -152,6 +152,7 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         if adaptive {
             let roundings = [T::EPSILON * roundings, estimate];
             let mut factors = PACE.map(|bound| bound.factor(hardware));
+            factors[3] *= twin.leveraged / twin.longest;
             factors[4] *= twin.leverage;
             insides_agree(inside, member, &scales, factors, roundings, OnGpu(left), OnCpu(&twin.left));
         }

@@ -23,13 +23,16 @@ pub(super) struct Twin {
     /// How much more the length of the next step depends on the error of the one that it was chosen after than where
     /// that error is the tolerance.
     pub(super) leverage: f64,
+    /// The largest product of a length and of that leverage, of the steps whose lengths add up to where the last one
+    /// begins.
+    pub(super) leveraged: f64,
 }
 
 /// Runs the twin of `launch` to its goal.
 pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
     let mut run: Run<T> = launch.convert();
     let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
-    let (mut work, mut leverage) = (Team::new(blocks(n)?), 1.0);
+    let (mut work, mut leverage, mut leveraged) = (Team::new(blocks(n)?), 1.0, vec![0.0]);
     while run.counters.is_running() {
         let before = run.report.now.excess.to_f64();
         let (own_order, is_aimed) = (run.counters.order, pace::is_aimed(&run.report.progress));
@@ -37,13 +40,16 @@ pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> 
         evolve(&mut run, method, &mut work, 1);
         steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
         longest = longest.max(run.report.progress.taken.to_f64());
+        leveraged.push(leverage * run.report.progress.taken.to_f64());
         let growth = (run.report.progress.next / run.report.progress.taken).to_f64();
         if !is_aimed && run.counters.refused == 0 {
             leverage = leverage_of(growth, own_order);
         }
     }
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    Ok(Twin { left, longest, steepest, order, leverage })
+    leveraged.pop();
+    let leveraged = leveraged.into_iter().fold(longest, f64::max);
+    Ok(Twin { left, longest, steepest, order, leverage, leveraged })
 }
 
 /// How near to each other, relatively, two lengths may be whose order decides what the next step is. Rounding changes
