@@ -3,6 +3,9 @@
 //! Nothing is compiled here. `curvelax-vectors-f32` and `curvelax-vectors-f64` do that for a precision each, at the
 //! same time, since it takes minutes.
 
+// Where there are no vectors, nothing fills lanes.
+#![cfg_attr(not(any(target_arch = "x86_64", target_arch = "aarch64")), allow(dead_code, unused_imports))]
+
 use std::{marker::PhantomData, sync::Mutex};
 
 use pulp::{NullaryFnOnce, Simd};

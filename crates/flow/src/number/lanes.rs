@@ -30,6 +30,7 @@ pub struct Here(());
 /// For use in the operations of [`Lanes`] and [`LaneMask`] only: the proof of [`Instructions::token`] rests on this.
 const HERE: Here = Here(());
 
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
 macro_rules! instructions {
     ($($type:ty: $aligned:ident $bytes:literal),*) => {
         $(
