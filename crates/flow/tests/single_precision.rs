@@ -455,8 +455,8 @@ mod fast_math {
     }
 
     /// The median and the largest error of ellipses under some flows against f64, and the largest beyond what the steps
-    /// of f64 themselves leave: where rounding makes a member take another step, as at 400 nodes, it differs by a part of
-    /// that.
+    /// of f64 themselves leave: where rounding makes a member take another step, as at 400 nodes, it differs by a part
+    /// of that.
     fn errors_of<const HELD: bool>(n: usize, geometric: bool, aspects: &[f64], flows: &[Flow]) -> [f64; 3] {
         let (mut all, mut most) = (Vec::new(), f64::NEG_INFINITY);
         for aspect in aspects {
