@@ -32,24 +32,25 @@ pub(super) struct Twin {
 pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> Result<Twin> {
     let mut run: Run<T> = launch.convert();
     let (mut longest, mut steepest, mut order) = (0.0_f64, 0.0_f64, LEAST_ORDER);
-    let (mut work, mut leverage, mut leveraged) = (Team::new(blocks(n)?), 1.0, vec![0.0]);
+    let (mut work, mut leverage) = (Team::new(blocks(n)?), 1.0);
+    // The product of the last step is left out.
+    let (mut product, mut leveraged) = (0.0, 0.0_f64);
     while run.counters.is_running() {
+        leveraged = leveraged.max(product);
         let before = run.report.now.excess.to_f64();
         let (own_order, is_aimed) = (run.counters.order, pace::is_aimed(&run.report.progress));
         order = order.max(own_order);
         evolve(&mut run, method, &mut work, 1);
         steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
         longest = longest.max(run.report.progress.taken.to_f64());
-        leveraged.push(leverage * run.report.progress.taken.to_f64());
+        product = leverage * run.report.progress.taken.to_f64();
         let growth = (run.report.progress.next / run.report.progress.taken).to_f64();
         if !is_aimed && run.counters.refused == 0 {
             leverage = leverage_of(growth, own_order);
         }
     }
     let left = Left { state: run.state.convert(), counters: run.counters, report: run.report.convert() };
-    leveraged.pop();
-    let leveraged = leveraged.into_iter().fold(longest, f64::max);
-    Ok(Twin { left, longest, steepest, order, leverage, leveraged })
+    Ok(Twin { left, longest, steepest, order, leverage, leveraged: leveraged.max(longest) })
 }
 
 /// How near to each other, relatively, two lengths may be whose order decides what the next step is. Rounding changes
