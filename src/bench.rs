@@ -7,6 +7,8 @@
 
 use std::time::{Duration, Instant};
 
+use curvelax_base::threads::HostThreads;
+
 use crate::{
     backend::Backend,
     curve::Modes,
@@ -15,6 +17,7 @@ use crate::{
     number::BIG,
     placement::{self, Platform},
     schedule::Outputs,
+    simulate::states_at_once,
     scheme::{
         member::{Counters, Report},
         run::Run,
@@ -47,6 +50,7 @@ pub struct Bench {
     backend: Box<dyn Backend>,
     platform: Platform,
     members: Vec<Run<f64>>,
+    threads: HostThreads,
     /// Curve-steps of each slot since its member was loaded.
     made: Vec<u64>,
     /// Steps from one aim to the next; [`u32::MAX`] if the back end pauses earlier by itself.
@@ -89,10 +93,9 @@ impl Bench {
         let started = Instant::now();
         let (backend, platform) = choice.open(spec, spec.points)?;
         let made = vec![0; count.min(backend.slots())];
-        let mut bench = Bench { backend, platform, members, made, stride: 1, start_up: Duration::ZERO };
-        for slot in 0..bench.made.len() {
-            bench.load(slot)?;
-        }
+        let threads = HostThreads::new(spec.threads.unwrap_or(0));
+        let mut bench = Bench { backend, platform, members, threads, made, stride: 1, start_up: Duration::ZERO };
+        bench.load((0..bench.made.len()).collect())?;
         bench.advance()?;
         bench.start_up = started.elapsed();
         bench.find_stride(window)?;
@@ -146,7 +149,7 @@ impl Bench {
     fn advance(&mut self) -> Result<BenchSample> {
         let started = Instant::now();
         self.backend.advance()?;
-        let mut sample = BenchSample::default();
+        let (mut sample, mut over) = (BenchSample::default(), Vec::new());
         for slot in 0..self.curves() {
             let (run, counters) = (&self.members[slot % self.members.len()], self.backend.counters(slot));
             let made = made(run, &counters);
@@ -161,21 +164,30 @@ impl Bench {
             if counters.steps < counters.goal {
                 sample.paused = true;
             } else if is_at_end(run, &counters, &self.backend.report(slot)) {
-                self.load(slot)?;
+                over.push(slot);
             } else {
                 let goal = counters.steps.saturating_add(self.stride).min(run.counters.goal);
                 self.backend.aim(slot, goal, &run.parameters);
             }
         }
+        self.load(over)?;
         sample.elapsed = started.elapsed();
         Ok(sample)
     }
 
-    fn load(&mut self, slot: usize) -> Result<()> {
-        let mut run = self.members[slot % self.members.len()].clone();
-        run.counters.goal = run.counters.goal.min(self.stride);
-        self.made[slot] = 0;
-        self.backend.load(slot, &run)
+    /// Loads new members into these slots, some at a time.
+    fn load(&mut self, slots: Vec<usize>) -> Result<()> {
+        for part in slots.chunks(states_at_once(self.members[0].state.curve.len())) {
+            let of_slot = |slot: usize| {
+                let mut run = self.members[slot % self.members.len()].clone();
+                run.counters.goal = run.counters.goal.min(self.stride);
+                self.made[slot] = 0;
+                (slot, run)
+            };
+            let runs = part.iter().copied().map(of_slot).collect();
+            self.backend.load_all(runs, &self.threads)?;
+        }
+        Ok(())
     }
 }
 

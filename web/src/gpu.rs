@@ -8,7 +8,7 @@ use curvelax_backend::{
     Backend,
     gpu::{
         Budget, Capacity, Variant,
-        mirror::{Binding, Caps, Mirror},
+        mirror::{Binding, Caps, Mirror, to_rows},
         shader,
     },
 };
@@ -133,7 +133,9 @@ impl Backend for WebGpu {
     }
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
-        let rows = self.mirror.load(slot, &run.convert());
+        let run = run.convert();
+        self.mirror.load(slot, &run);
+        let rows = to_rows(self.mirror.blocks(), &run.state);
         let (offset, _) = self.mirror.state_at(slot);
         let first = offset as usize / size_of::<f32>();
         self.states[first..first + rows.len()].copy_from_slice(&rows);

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 pub use device_kind::DeviceKind;
 
-use curvelax_base::error::Result;
+use curvelax_base::{error::Result, threads::HostThreads};
 use curvelax_flow::scheme::{
     Parameters, State,
     member::{Counters, Report},
@@ -31,6 +31,12 @@ pub trait Backend {
 
     /// Puts a member into a slot, replacing any member there.
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()>;
+
+    /// Puts members into slots, as [`load`](Backend::load) does; what a back end makes of them first is spread over
+    /// `threads`.
+    fn load_all(&mut self, runs: Vec<(usize, Run<f64>)>, _threads: &HostThreads) -> Result<()> {
+        runs.iter().try_for_each(|(slot, run)| self.load(*slot, run))
+    }
 
     /// Lets the member in `slot` continue under `parameters` until it has made `goal` steps or pauses by itself.
     fn aim(&mut self, slot: usize, goal: u32, parameters: &Parameters<f64>);

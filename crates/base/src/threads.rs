@@ -57,6 +57,34 @@ pub fn hand_over(pool: &ThreadPool, work: impl FnOnce() + Send + 'static) {
     }
 }
 
+/// Threads that prepare members and evaluate them while a back end advances others. They start when they are first
+/// needed.
+pub struct HostThreads {
+    count: usize,
+    pool: OnceLock<Option<ThreadPool>>,
+}
+
+impl HostThreads {
+    /// Fewer items are not worth starting threads for.
+    const MIN_ITEMS: usize = 64;
+
+    /// Plans `count` threads (0: all cores).
+    pub fn new(count: usize) -> HostThreads {
+        HostThreads { count, pool: OnceLock::new() }
+    }
+
+    /// Returns `of` for each item, in order: on these threads, or on the thread that asks if there is little to do, if
+    /// one is enough, or if the system starts no more of them.
+    pub fn map<T: Send, R: Send>(&self, items: Vec<T>, of: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
+        let alone = self.count == 1 || cfg!(target_family = "wasm");
+        let start = || ThreadPoolBuilder::new().num_threads(self.count).build().ok();
+        match if alone || items.len() < Self::MIN_ITEMS { &None } else { self.pool.get_or_init(start) } {
+            Some(pool) => pool.install(|| items.into_par_iter().map(of).collect()),
+            None => items.into_iter().map(of).collect(),
+        }
+    }
+}
+
 fn no_more(what: &str, fewer: &str, error: &dyn Display) -> Error {
     Error::Failed(format!("cannot start {what}: {error}; {fewer}{REMEDY}"))
 }
@@ -89,6 +117,17 @@ mod tests {
         let error = no_more("1 thread", "", &"no");
         assert_eq!(error.exit_code(), 1);
         assert_eq!(error.to_string(), format!("cannot start 1 thread: no; {REMEDY}"));
+    }
+
+    #[test]
+    fn items_stay_in_order_and_threads_start_only_for_many() {
+        for (threads, items, start) in [(0, 1000, true), (3, 1000, true), (3, 10, false), (1, 1000, false)] {
+            let host = HostThreads::new(threads);
+            let here = std::thread::current().id();
+            let done = host.map((0..items).collect(), |i: u32| (2 * i, std::thread::current().id()));
+            assert!(done.iter().zip(0..).all(|((double, _), i)| *double == 2 * i));
+            assert_eq!(done.iter().any(|(_, thread)| *thread != here), start, "{threads} threads, {items} items");
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! between any two dispatches: the [`RunProgress`] then has all that [`resume`] needs to end it as it would have ended.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::{BTreeMap, BTreeSet, VecDeque},
     iter::Peekable,
     ops::Range,
     time::{Duration, Instant},
@@ -19,9 +19,13 @@ use crate::{
     trajectory::{Trajectory, settling_times},
 };
 use curvelax_backend::Backend;
-use curvelax_base::error::{Error, Result};
+use curvelax_base::{
+    error::{Error, Result},
+    threads::HostThreads,
+};
 use curvelax_flow::scheme::{
-    member,
+    Parameters, member,
+    run::Run,
     state::{STATE_FIELDS, State},
 };
 
@@ -31,7 +35,7 @@ const MEMBERS_AHEAD: usize = 8;
 /// Interval at which the sink is notified, and may stop the run, during longer dispatches.
 const MAX_WAIT: Duration = Duration::from_millis(200);
 
-/// Maximum members that end at creation between two calls of the sink.
+/// Maximum members that are created at once, and roughly that end at their creation between two calls of the sink.
 const MAX_AT_ONCE: usize = 1000;
 
 /// Maximum states read back at once for a checkpoint, and their maximum bytes.
@@ -94,6 +98,7 @@ pub struct Roster<'a> {
     /// For each cell: for members without a portrait, and for those with one.
     outputs: [Vec<Outputs>; 2],
     portraits: usize,
+    threads: HostThreads,
 }
 
 impl<'a> Roster<'a> {
@@ -109,12 +114,79 @@ impl<'a> Roster<'a> {
             };
             cells.iter().map(of_cell).collect()
         };
-        Roster { cells, precision, outputs: [outputs(false), outputs(true)], portraits }
+        let threads = HostThreads::new(cells.first().and_then(|cell| cell.spec.threads).unwrap_or(0));
+        Roster { cells, precision, outputs: [outputs(false), outputs(true)], portraits, threads }
+    }
+
+    /// Creates a member at its start.
+    fn create(&self, (cell, index): (usize, u64)) -> Result<Trajectory<'_>> {
+        let own = &self.cells[cell];
+        let each = (self.portraits / self.cells.len().max(1)).max(1);
+        // The same members whatever their shard.
+        let portrait = cell < self.portraits && own.place(index) < each as u64;
+        let outputs = &self.outputs[usize::from(portrait)][cell];
+        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
+        trajectory.keep_portrait(portrait);
+        Ok(trajectory)
+    }
+
+    /// Prepares a member, paused or new, for a back end, or ends it if there is nothing to do.
+    fn admit(&self, who: (usize, u64), paused: Option<Paused>) -> Result<Admitted<'_>> {
+        let mut trajectory = self.create(who)?;
+        if trajectory.is_over() {
+            return Ok(Admitted::Over(Box::new(self.end(trajectory, None))));
+        }
+        paused.map_or(Ok(()), |paused| trajectory.resume_from(paused))?;
+        let run = trajectory.launch();
+        Ok(Admitted::Runs(Box::new((trajectory, run))))
+    }
+
+    /// Ends a member. What theory predicts may depend on when it relaxed.
+    fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
+        let mut ended = trajectory.end(last);
+        // Not all cells have a level.
+        let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
+        ended.outcome.rate_theory = at.ok().and_then(|at| {
+            let cell = &self.cells[at];
+            let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
+            linear_rate::rate_of(&cell.spec, &values, &ended.outcome)
+        });
+        ended
+    }
+
+    /// Sets the next goal of a member whose output times have been served, or ends it.
+    fn proceed<'b>(&self, trajectory: Trajectory<'b>, state: Option<&State<f64>>) -> Served<'b> {
+        if trajectory.is_over() {
+            return Served::Over(Box::new(self.end(trajectory, state)));
+        }
+        let aim = trajectory.next_aim();
+        Served::Runs(trajectory, aim)
     }
 }
 
+/// What has become of a member at its creation.
+enum Admitted<'a> {
+    Over(Box<Ended>),
+    Runs(Box<(Trajectory<'a>, Run<f64>)>),
+}
+
+/// The next goal of a member, as a number of steps, and the parameters until then.
+type Aim = (u32, Parameters<f64>);
+
+/// What has become of a member after a dispatch.
+enum Served<'a> {
+    Over(Box<Ended>),
+    /// With another goal, if it has one.
+    Runs(Trajectory<'a>, Option<Aim>),
+    /// Its rows fill the memory that it has before all output times are served; with its state.
+    Full(Trajectory<'a>, Option<State<f64>>),
+}
+
 /// Members that wait: their ranks, cells and indices.
-type Waiting<'a> = Peekable<Box<dyn Iterator<Item = (u64, (usize, u64))> + 'a>>;
+type Waiting<'a> = Peekable<Box<dyn Iterator<Item = Entering> + 'a>>;
+
+/// The rank of a member in its run, its cell and its index.
+type Entering = (u64, (usize, u64));
 
 /// A run in turns, for a caller who has other things to do between them, such as a page in a browser; [`simulate`]
 /// takes one after another.
@@ -195,15 +267,18 @@ impl<'a> Simulation<'a> {
             pool.collect(backend, slots.clone(), queue, sink)?;
         }
         // The sink must be asked even if members end at once.
-        let mut over = 0;
-        for slot in slots.clone() {
-            while pool.resident[slot].is_none() && over < MAX_AT_ONCE {
-                let Some((rank, who)) = waiting.next_if(|(rank, _)| *rank < queue.next + *ahead) else { break };
-                if let Some(ended) = pool.admit(backend, slot, rank, who)? {
-                    over += 1;
-                    queue.leave(rank, ended, sink)?;
-                }
+        let (mut over, most) = (0, MAX_AT_ONCE.min(states_at_once(pool.points())));
+        let mut free: VecDeque<usize> = slots.clone().filter(|slot| pool.resident[*slot].is_none()).collect();
+        while over < MAX_AT_ONCE {
+            let next = |slot| Some((slot, waiting.next_if(|(rank, _)| *rank < queue.next + *ahead)?));
+            let entering: Vec<_> = free.iter().copied().take(most).map_while(next).collect();
+            if entering.is_empty() {
+                break;
             }
+            free.drain(..entering.len());
+            let ended = pool.admit(backend, entering, queue, sink)?;
+            over += ended.len();
+            free.extend(ended);
         }
         queue.tell(pool, sink)?;
         if pool.resident.iter().all(Option::is_none) && waiting.peek().is_none() {
@@ -253,47 +328,41 @@ struct Pool<'a> {
     held: usize,
 }
 
-impl Pool<'_> {
-    /// Puts a member, the `rank`-th of this run, into a free slot; or ends it if there is nothing to do.
+impl<'a> Pool<'a> {
+    /// Puts members into free slots, each with its rank in this run; returns the slots of those that end at once,
+    /// because there is nothing to do.
     fn admit(
         &mut self,
         backend: &mut dyn Backend,
-        slot: usize,
-        rank: u64,
-        (cell, index): (usize, u64),
-    ) -> Result<Option<Ended>> {
-        let Roster { cells, precision, outputs, portraits } = self.roster;
-        let own = &cells[cell];
-        let each = (portraits / cells.len().max(1)).max(1);
-        // The same members whatever their shard.
-        let portrait = cell < *portraits && own.place(index) < each as u64;
-        let outputs = &outputs[usize::from(portrait)][cell];
-        let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, *precision, outputs);
-        trajectory.keep_portrait(portrait);
-        if trajectory.is_over() {
-            return Ok(Some(self.end(trajectory, None)));
+        entering: Vec<(usize, Entering)>,
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<Vec<usize>> {
+        let roster = self.roster;
+        let with_paused = |(slot, (rank, who))| (slot, rank, who, self.paused.remove(&rank));
+        let entering = entering.into_iter().map(with_paused).collect();
+        let admitted = roster.threads.map(entering, |(slot, rank, who, paused)| (slot, rank, roster.admit(who, paused)));
+        let (mut over, mut runs, mut failed) = (Vec::new(), Vec::new(), Ok(()));
+        for (slot, rank, admitted) in admitted {
+            match admitted {
+                Ok(Admitted::Over(ended)) => {
+                    over.push(slot);
+                    queue.leave(rank, *ended, sink)?;
+                }
+                Ok(Admitted::Runs(own)) => {
+                    let (mut trajectory, run) = *own;
+                    self.held += trajectory.rows().bytes();
+                    self.resident[slot] = Some((rank, trajectory));
+                    runs.push((slot, run));
+                }
+                Err(error) => {
+                    failed = Err(error);
+                    break;
+                }
+            }
         }
-        if let Some(paused) = self.paused.remove(&rank) {
-            trajectory.resume_from(paused)?;
-        }
-        self.held += trajectory.rows().bytes();
-        backend.load(slot, &trajectory.launch())?;
-        self.resident[slot] = Some((rank, trajectory));
-        Ok(None)
-    }
-
-    /// Ends a member. What theory predicts may depend on when it relaxed.
-    fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
-        let mut ended = trajectory.end(last);
-        // Not all cells have a level.
-        let cells = self.roster.cells;
-        let at = cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
-        ended.outcome.rate_theory = at.ok().and_then(|at| {
-            let cell = &cells[at];
-            let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
-            linear_rate::rate_of(&cell.spec, &values, &ended.outcome)
-        });
-        ended
+        backend.load_all(runs, &roster.threads)?;
+        failed.map(|()| over)
     }
 
     /// Nodes of a member.
@@ -346,23 +415,42 @@ impl Pool<'_> {
         }
         // One transfer for all.
         let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
-        for slot in slots.iter().copied() {
-            let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
-            let state = states.remove(&slot);
+        let roster = self.roster;
+        let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
+        let taken: Vec<_> = slots.iter().filter_map(take).collect();
+        let share = MAX_HELD / taken.len().max(1);
+        let served = roster.threads.map(taken, |(slot, (rank, mut trajectory), state)| {
             let before = trajectory.rows().bytes();
-            let mut most = MAX_OF_ONE;
-            // One step may pass more output times than memory has room for.
-            while !trajectory.serve(state.as_ref(), most) {
-                most = if trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
+            let all = trajectory.serve(state.as_ref(), before + share);
+            let more = trajectory.rows().bytes().saturating_sub(before);
+            let served = if all { roster.proceed(trajectory, state.as_ref()) } else { Served::Full(trajectory, state) };
+            (slot, rank, served, more)
+        });
+        let mut rest = Vec::new();
+        for (slot, rank, served, more) in served {
+            self.held += more;
+            match served {
+                Served::Runs(trajectory, aim) => self.keep(backend, slot, (rank, trajectory), aim),
+                other => rest.push((slot, rank, other)),
             }
-            self.held += trajectory.rows().bytes().saturating_sub(before);
-            if !trajectory.is_over() {
-                if let Some((goal, parameters)) = trajectory.next_aim() {
-                    backend.aim(slot, goal, &parameters);
+        }
+        for (slot, rank, mut served) in rest {
+            if let Served::Full(mut trajectory, state) = served {
+                let (before, mut most) = (trajectory.rows().bytes(), MAX_OF_ONE);
+                // One step may pass more output times than memory has room for.
+                while !trajectory.serve(state.as_ref(), most) {
+                    most = if trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
                 }
-            } else if let Some((rank, trajectory)) = self.resident[slot].take() {
-                backend.clear(slot);
-                queue.leave(rank, self.end(trajectory, state.as_ref()), sink)?;
+                self.held += trajectory.rows().bytes().saturating_sub(before);
+                served = roster.proceed(trajectory, state.as_ref());
+            }
+            match served {
+                Served::Runs(trajectory, aim) => self.keep(backend, slot, (rank, trajectory), aim),
+                Served::Over(ended) => {
+                    backend.clear(slot);
+                    queue.leave(rank, *ended, sink)?;
+                }
+                Served::Full(..) => unreachable!("all output times have been served"),
             }
             if self.held > MAX_HELD {
                 self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
@@ -372,7 +460,18 @@ impl Pool<'_> {
                 queue.tell(self, sink)?;
             }
         }
+        if self.held > MAX_HELD {
+            self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
+        }
         Ok(())
+    }
+
+    /// Lets a member continue in its slot.
+    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: (u64, Trajectory<'a>), aim: Option<Aim>) {
+        self.resident[slot] = Some(own);
+        if let Some((goal, parameters)) = aim {
+            backend.aim(slot, goal, &parameters);
+        }
     }
 
     /// Passes all rows in memory to the sink if they exceed `most` bytes.

@@ -217,11 +217,11 @@ impl Gpu {
         }
     }
 
-    /// Opens the adapter with all its limits, and with f64 and subgroups where it has them.
+    /// Opens the adapter with all its limits, and with f64, subgroups and a clock where it has them.
     fn open(&self) -> Result<OpenGpu> {
         let descriptor = wgpu::DeviceDescriptor {
             label: Some("curvelax"),
-            required_features: self.adapter.features() & (wgpu::Features::SHADER_F64 | wgpu::Features::SUBGROUP),
+            required_features: self.adapter.features() & FEATURES,
             required_limits: self.adapter.limits(),
             ..Default::default()
         };
@@ -245,6 +245,10 @@ impl Gpu {
         Ok(OpenGpu { device, queue, name: self.name().to_string(), in_process, fault })
     }
 }
+
+/// What is used where an adapter has it.
+const FEATURES: wgpu::Features =
+    wgpu::Features::SHADER_F64.union(wgpu::Features::SUBGROUP).union(wgpu::Features::TIMESTAMP_QUERY);
 
 /// Result of a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -22,6 +22,7 @@ pub(super) struct Batch<T> {
     buffers: Buffers,
     bindings: wgpu::BindGroup,
     mirror: Mirror<T>,
+    clock: Option<DeviceClock>,
     flight: Option<Flight>,
 }
 
@@ -29,6 +30,59 @@ pub(super) struct Batch<T> {
 struct Flight {
     since: Moment,
     back: Reading,
+}
+
+/// A dispatch that is done.
+pub(super) struct Landed {
+    /// When it was started.
+    pub since: Moment,
+    /// How long it took by the clock of the device, if that has one.
+    pub took: Option<Duration>,
+}
+
+/// The device's clock, read where a dispatch begins and where it ends.
+struct DeviceClock {
+    times: wgpu::QuerySet,
+    ticks: wgpu::Buffer,
+    nanoseconds_per_tick: f64,
+}
+
+impl DeviceClock {
+    const BYTES: u64 = 2 * wgpu::QUERY_SIZE as u64;
+
+    /// A clock of `device`, if it has one.
+    fn new(device: &OpenGpu) -> Option<DeviceClock> {
+        let nanoseconds_per_tick = f64::from(device.queue.get_timestamp_period());
+        device.device.features().contains(wgpu::Features::TIMESTAMP_QUERY).then(|| DeviceClock {
+            times: device.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("times"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2,
+            }),
+            ticks: device.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("ticks"),
+                size: Self::BYTES,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            nanoseconds_per_tick,
+        })
+    }
+
+    fn writes(&self) -> wgpu::ComputePassTimestampWrites<'_> {
+        wgpu::ComputePassTimestampWrites {
+            query_set: &self.times,
+            beginning_of_pass_write_index: Some(0),
+            end_of_pass_write_index: Some(1),
+        }
+    }
+
+    /// The time between the two readings, if the clock ran.
+    fn between(&self, bytes: &[u8]) -> Option<Duration> {
+        let ticks: Vec<u64> = bytemuck::pod_collect_to_vec(bytes);
+        let passed = ticks[1].checked_sub(ticks[0]).filter(|passed| *passed > 0)?;
+        Some(Duration::from_nanos((passed as f64 * self.nanoseconds_per_tick) as u64))
+    }
 }
 
 /// A copy to the host in progress.
@@ -53,6 +107,7 @@ impl<T: Real> Batch<T> {
             bindings: buffers.bind(&device.device, pipeline),
             buffers,
             mirror: Mirror::new(blocks, slots),
+            clock: DeviceClock::new(device),
             flight: None,
         }
     }
@@ -81,10 +136,11 @@ impl<T: Real> Batch<T> {
         self.buffers.bound.get(Binding::Trace as usize)
     }
 
-    pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>) {
-        let rows = self.mirror.load(slot, run);
+    /// Puts a member, whose state is `rows`, into a slot.
+    pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>, rows: &[T]) {
+        self.mirror.load(slot, run);
         let (states, offset, _) = self.state_at(slot);
-        device.queue.write_buffer(states, offset, bytemuck::cast_slice(&rows));
+        device.queue.write_buffer(states, offset, bytemuck::cast_slice(rows));
     }
 
     /// Dispatches the members that are due, if any.
@@ -93,18 +149,24 @@ impl<T: Real> Batch<T> {
         if due == 0 {
             return;
         }
-        let Batch { mirror, buffers, .. } = self;
+        let Batch { mirror, buffers, clock, .. } = self;
         mirror.upload(budget, caps, |binding, offset, bytes| {
             device.queue.write_buffer(buffers.at(binding), offset, bytes);
         });
         let mut encoder = device.device.create_command_encoder(&Default::default());
-        let mut pass = encoder.begin_compute_pass(&Default::default());
+        let timestamp_writes = clock.as_ref().map(DeviceClock::writes);
+        let mut pass =
+            encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("evolve"), timestamp_writes });
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &self.bindings, &[]);
         pass.dispatch_workgroups(due, 1, 1);
         drop(pass);
+        if let Some(clock) = clock {
+            encoder.resolve_query_set(&clock.times, 0..2, &clock.ticks, 0);
+        }
         let reads = [Binding::Counters, Binding::Reports].map(|binding| buffers.at(binding));
-        let reads = reads.map(|buffer| (buffer, 0, buffer.size()));
+        let reads: Vec<_> = reads.into_iter().chain(clock.as_ref().map(|clock| &clock.ticks)).collect();
+        let reads: Vec<_> = reads.into_iter().map(|buffer| (buffer, 0, buffer.size())).collect();
         let back = Reading::submit(device, encoder, &buffers.staging, &reads);
         self.flight = Some(Flight { since: device.now(), back });
     }
@@ -121,16 +183,18 @@ impl<T: Real> Batch<T> {
         !matches!(device.wait(&back.submission, most), Ok(Waited::Pending))
     }
 
-    /// Waits for the dispatch while it has time `left`, and reads its records; returns when it was started.
-    pub fn finish(&mut self, device: &OpenGpu, left: impl Fn(Moment) -> Duration) -> Result<Option<Moment>> {
+    /// Waits for the dispatch, if there is one, while it has time `left`, and reads its records.
+    pub fn finish(&mut self, device: &OpenGpu, left: impl Fn(Moment) -> Duration) -> Result<Option<Landed>> {
         let Some(Flight { since, back }) = self.flight.take() else {
             self.mirror.forget_sweeps();
             return Ok(None);
         };
         let bytes = back.wait(device, since, left)?;
         let idle = |slot| device.error(&format!("a dispatch did nothing for the member in slot {slot}"));
-        self.mirror.take(&bytes).map_err(idle)?;
-        Ok(Some(since))
+        let (records, ticks) = bytes.split_at(self.mirror.bytes_back());
+        self.mirror.take(records).map_err(idle)?;
+        let took = self.clock.as_ref().and_then(|clock| clock.between(ticks));
+        Ok(Some(Landed { since, took }))
     }
 }
 
@@ -197,7 +261,7 @@ impl Buffers {
         let bindings = Binding::ALL.into_iter().filter(|binding| traced || *binding != Binding::Trace);
         let bound: Vec<wgpu::Buffer> = bindings.map(buffer).collect();
         let back = [Binding::Counters, Binding::Reports].map(|binding| bound[binding as usize].size());
-        Buffers { staging: staging(device, back.into_iter().sum()), bound }
+        Buffers { staging: staging(device, back.into_iter().sum::<u64>() + DeviceClock::BYTES), bound }
     }
 
     fn at(&self, binding: Binding) -> &wgpu::Buffer {

@@ -7,19 +7,20 @@ use std::time::{Duration, Instant};
 
 use super::{
     adapter::{Gpu, OpenGpu},
-    batch::{Batch, Reading, staging},
+    batch::{Batch, Landed, Reading, staging},
     clock::Moment,
 };
 use curvelax_backend::{
     Backend,
     gpu::{
         Variant,
-        mirror::{Caps, Mirror, state_numbers},
+        mirror::{Caps, Mirror, state_numbers, to_rows},
     },
 };
 use curvelax_base::{
     error::{Error, Result},
     text::{bytes, plural},
+    threads::HostThreads,
 };
 use curvelax_flow::{
     number::Real,
@@ -202,11 +203,23 @@ impl<T: Real> Backend for Kernel<T> {
     }
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
-        if run.parameters.branches().watched && !self.watched {
+        self.load_all(vec![(slot, run.clone())], &HostThreads::new(1))
+    }
+
+    fn load_all(&mut self, runs: Vec<(usize, Run<f64>)>, threads: &HostThreads) -> Result<()> {
+        if !self.watched && runs.iter().any(|(_, run)| run.parameters.branches().watched) {
             return Err(Error::Failed("a member waits for a level, and the kernel was compiled without levels".into()));
         }
-        let (batch, at) = (slot / self.slots_per_batch, slot % self.slots_per_batch);
-        self.batches[batch].load(&self.gpu, at, &run.convert());
+        let blocks = self.batches[0].mirror().blocks();
+        let prepared = threads.map(runs, |(slot, run)| {
+            let run = run.convert();
+            let rows = to_rows(blocks, &run.state);
+            (slot, run, rows)
+        });
+        for (slot, run, rows) in prepared {
+            let (batch, at) = (slot / self.slots_per_batch, slot % self.slots_per_batch);
+            self.batches[batch].load(&self.gpu, at, &run, &rows);
+        }
         self.gpu.check()
     }
 
@@ -244,8 +257,9 @@ impl<T: Real> Backend for Kernel<T> {
 
     fn finish(&mut self, batch: usize) -> Result<()> {
         let left = self.left();
-        let Some(since) = self.batches[batch].finish(&self.gpu, left)? else { return Ok(()) };
-        let took = since.later(self.ended).elapsed();
+        let Some(Landed { since, took }) = self.batches[batch].finish(&self.gpu, left)? else { return Ok(()) };
+        // Without a clock of the device, the time until the host asked.
+        let took = took.unwrap_or_else(|| since.later(self.ended).elapsed());
         self.ended = self.gpu.now();
         if !self.fixed {
             self.budget = self.budget.after(took, self.solver, self.most);

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::Backend;
 use curvelax_base::{
     error::{Error, Result},
-    threads,
+    threads::{self, HostThreads},
 };
 use curvelax_flow::{
     scheme::{
@@ -176,6 +176,13 @@ impl<T: Vectorised> Backend for CpuBackend<T> {
 
     fn load(&mut self, slot: usize, run: &Run<f64>) -> Result<()> {
         *self.place(slot) = Some(Box::new(run.convert()));
+        Ok(())
+    }
+
+    fn load_all(&mut self, runs: Vec<(usize, Run<f64>)>, threads: &HostThreads) -> Result<()> {
+        for (slot, run) in threads.map(runs, |(slot, run)| (slot, Box::new(run.convert()))) {
+            *self.place(slot) = Some(run);
+        }
         Ok(())
     }
 

@@ -96,7 +96,7 @@ pub fn state_numbers(blocks: Blocks) -> usize {
 }
 
 /// Converts a state to rows; the last number of a block of three repeats its third node.
-fn to_rows<T: Real>(blocks: Blocks, state: &State<T>) -> Vec<T> {
+pub fn to_rows<T: Real>(blocks: Blocks, state: &State<T>) -> Vec<T> {
     let row = |field: &[T], (first, nodes): (usize, usize)| [0, 1, 2, 3].map(|c| field[first + c.min(nodes - 1)]);
     let numbers = state.to_numbers();
     let fields = numbers.chunks_exact(blocks.n);
@@ -126,9 +126,19 @@ impl<T: Real> Mirror<T> {
         }
     }
 
+    /// Returns how the rings of its members are cut.
+    pub fn blocks(&self) -> Blocks {
+        self.blocks
+    }
+
     /// Returns the number of slots.
     pub fn slots(&self) -> usize {
         self.counters.len()
+    }
+
+    /// Returns the bytes of its records after a dispatch: counters, then reports.
+    pub fn bytes_back(&self) -> usize {
+        [Binding::Counters, Binding::Reports].iter().map(|binding| binding.bytes::<T>(self.blocks, self.slots())).sum()
     }
 
     /// Returns the counters of a member; the sweeps are those of the last dispatch.
@@ -155,12 +165,11 @@ impl<T: Real> Mirror<T> {
         State::from_numbers(&numbers)
     }
 
-    /// Puts a member into a slot, and returns its state as it is to be stored.
-    pub fn load(&mut self, slot: usize, run: &Run<T>) -> Vec<T> {
+    /// Puts a member into a slot; its state is to be stored as [rows](to_rows).
+    pub fn load(&mut self, slot: usize, run: &Run<T>) {
         self.counters[slot] = run.counters;
         self.reports[slot] = run.report;
         self.set_parameters(slot, &run.parameters);
-        to_rows(self.blocks, &run.state)
     }
 
     /// Changes the parameters of a member.
