@@ -17,11 +17,11 @@ use crate::{
     number::BIG,
     placement::{self, Platform},
     schedule::Outputs,
-    simulate::states_at_once,
     scheme::{
         member::{Counters, Report},
         run::Run,
     },
+    simulate::states_at_once,
     trajectory::Trajectory,
 };
 

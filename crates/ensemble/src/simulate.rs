@@ -155,12 +155,12 @@ impl<'a> Roster<'a> {
     }
 
     /// Sets the next goal of a member whose output times have been served, or ends it.
-    fn proceed<'b>(&self, trajectory: Trajectory<'b>, state: Option<&State<f64>>) -> Served<'b> {
-        if trajectory.is_over() {
-            return Served::Over(Box::new(self.end(trajectory, state)));
+    fn proceed<'b>(&self, own: Resident<'b>, state: Option<&State<f64>>) -> Served<'b> {
+        if own.trajectory.is_over() {
+            return Served::Over(own.rank, Box::new(self.end(own.trajectory, state)));
         }
-        let aim = trajectory.next_aim();
-        Served::Runs(trajectory, aim)
+        let aim = own.trajectory.next_aim();
+        Served::Runs(own, aim)
     }
 }
 
@@ -175,11 +175,12 @@ type Aim = (u32, Parameters<f64>);
 
 /// What has become of a member after a dispatch.
 enum Served<'a> {
-    Over(Box<Ended>),
+    /// With its rank.
+    Over(u64, Box<Ended>),
     /// With another goal, if it has one.
-    Runs(Trajectory<'a>, Option<Aim>),
+    Runs(Resident<'a>, Option<Aim>),
     /// Its rows fill the memory that it has before all output times are served; with its state.
-    Full(Trajectory<'a>, Option<State<f64>>),
+    Full(Resident<'a>, Option<State<f64>>),
 }
 
 /// Members that wait: their ranks, cells and indices.
@@ -234,7 +235,15 @@ impl<'a> Simulation<'a> {
         let waiting: Box<dyn Iterator<Item = _>> = Box::new(left);
         Ok(Simulation {
             pool,
-            queue: Queue { total, ended: next + early.len() as u64, next, early, kept: false, told: Instant::now() },
+            queue: Queue {
+                total,
+                ended: next + early.len() as u64,
+                next,
+                early,
+                saved: Instant::now(),
+                kept: false,
+                told: Instant::now(),
+            },
             waiting: waiting.peekable(),
             ahead: (MEMBERS_AHEAD * slots) as u64,
             batch: 0,
@@ -286,8 +295,10 @@ impl<'a> Simulation<'a> {
         }
         let request = sink.next_request();
         let continues = matches!(request, SinkRequest::Continue);
-        // A checkpoint needs all batches back.
-        if !continues && !on_the_way.contains(&true) {
+        if matches!(request, SinkRequest::Checkpoint) && pool.are_young(queue.saved, Instant::now()) {
+            queue.checkpoint(None, sink)?;
+        } else if !continues && !on_the_way.contains(&true) {
+            // A checkpoint of members in progress needs all batches back.
             pool.relieve(queue, MAX_KEPT, sink)?;
             queue.checkpoint(Some(pool.pause(backend)?), sink)?;
             if let SinkRequest::Stop(error) = request {
@@ -309,7 +320,7 @@ impl<'a> Simulation<'a> {
     /// The members that are being advanced, each with its slot.
     pub fn resident(&self) -> impl Iterator<Item = (usize, &Trajectory<'a>)> {
         let resident = self.pool.resident.iter().enumerate();
-        resident.filter_map(|(slot, own)| own.as_ref().map(|(_, trajectory)| (slot, trajectory)))
+        resident.filter_map(|(slot, own)| own.as_ref().map(|own| (slot, &own.trajectory)))
     }
 }
 
@@ -318,10 +329,19 @@ pub fn states_at_once(n: usize) -> usize {
     (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * n)).max(1)
 }
 
+/// A member in a slot.
+struct Resident<'a> {
+    /// Its rank in this run.
+    rank: u64,
+    trajectory: Trajectory<'a>,
+    /// When it began; none if it continues from a checkpoint.
+    begun: Option<Instant>,
+}
+
 /// The resident members of a run.
 struct Pool<'a> {
     roster: &'a Roster<'a>,
-    resident: Vec<Option<(u64, Trajectory<'a>)>>,
+    resident: Vec<Option<Resident<'a>>>,
     /// Members that continue from a checkpoint, by rank.
     paused: BTreeMap<u64, Paused>,
     /// Bound on the bytes of rows in memory, including members that ended early.
@@ -341,9 +361,12 @@ impl<'a> Pool<'a> {
         let roster = self.roster;
         let with_paused = |(slot, (rank, who))| (slot, rank, who, self.paused.remove(&rank));
         let entering = entering.into_iter().map(with_paused).collect();
-        let admitted = roster.threads.map(entering, |(slot, rank, who, paused)| (slot, rank, roster.admit(who, paused)));
+        let admitted = roster.threads.map(entering, |(slot, rank, who, paused)| {
+            let begun = paused.is_none().then(Instant::now);
+            (slot, rank, begun, roster.admit(who, paused))
+        });
         let (mut over, mut runs, mut failed) = (Vec::new(), Vec::new(), Ok(()));
-        for (slot, rank, admitted) in admitted {
+        for (slot, rank, begun, admitted) in admitted {
             match admitted {
                 Ok(Admitted::Over(ended)) => {
                     over.push(slot);
@@ -352,7 +375,7 @@ impl<'a> Pool<'a> {
                 Ok(Admitted::Runs(own)) => {
                     let (mut trajectory, run) = *own;
                     self.held += trajectory.rows().bytes();
-                    self.resident[slot] = Some((rank, trajectory));
+                    self.resident[slot] = Some(Resident { rank, trajectory, begun });
                     runs.push((slot, run));
                 }
                 Err(error) => {
@@ -361,6 +384,7 @@ impl<'a> Pool<'a> {
                 }
             }
         }
+
         backend.load_all(runs, &roster.threads)?;
         failed.map(|()| over)
     }
@@ -377,8 +401,8 @@ impl<'a> Pool<'a> {
         let mut all = self.paused.clone();
         for part in occupied.chunks(states_at_once(self.points()).min(READ_BACK)) {
             let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
-            for ((slot, (rank, trajectory)), state) in part.iter().zip(backend.states(&slots)?) {
-                all.insert(*rank, trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
+            for ((slot, own), state) in part.iter().zip(backend.states(&slots)?) {
+                all.insert(own.rank, own.trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
             }
         }
         Ok(all)
@@ -407,7 +431,7 @@ impl<'a> Pool<'a> {
     ) -> Result<()> {
         let mut wanted = Vec::new();
         for slot in slots.iter().copied() {
-            let Some((_, trajectory)) = &mut self.resident[slot] else { continue };
+            let Some(Resident { trajectory, .. }) = &mut self.resident[slot] else { continue };
             trajectory.observe(backend.counters(slot), &backend.report(slot));
             if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
                 wanted.push(slot);
@@ -419,34 +443,33 @@ impl<'a> Pool<'a> {
         let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
         let taken: Vec<_> = slots.iter().filter_map(take).collect();
         let share = MAX_HELD / taken.len().max(1);
-        let served = roster.threads.map(taken, |(slot, (rank, mut trajectory), state)| {
-            let before = trajectory.rows().bytes();
-            let all = trajectory.serve(state.as_ref(), before + share);
-            let more = trajectory.rows().bytes().saturating_sub(before);
-            let served = if all { roster.proceed(trajectory, state.as_ref()) } else { Served::Full(trajectory, state) };
-            (slot, rank, served, more)
+        let served = roster.threads.map(taken, |(slot, mut own, state)| {
+            let before = own.trajectory.rows().bytes();
+            let all = own.trajectory.serve(state.as_ref(), before + share);
+            let more = own.trajectory.rows().bytes().saturating_sub(before);
+            (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state) }, more)
         });
         let mut rest = Vec::new();
-        for (slot, rank, served, more) in served {
+        for (slot, served, more) in served {
             self.held += more;
             match served {
-                Served::Runs(trajectory, aim) => self.keep(backend, slot, (rank, trajectory), aim),
-                other => rest.push((slot, rank, other)),
+                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
+                other => rest.push((slot, other)),
             }
         }
-        for (slot, rank, mut served) in rest {
-            if let Served::Full(mut trajectory, state) = served {
-                let (before, mut most) = (trajectory.rows().bytes(), MAX_OF_ONE);
+        for (slot, mut served) in rest {
+            if let Served::Full(mut own, state) = served {
+                let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
                 // One step may pass more output times than memory has room for.
-                while !trajectory.serve(state.as_ref(), most) {
-                    most = if trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
+                while !own.trajectory.serve(state.as_ref(), most) {
+                    most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
                 }
-                self.held += trajectory.rows().bytes().saturating_sub(before);
-                served = roster.proceed(trajectory, state.as_ref());
+                self.held += own.trajectory.rows().bytes().saturating_sub(before);
+                served = roster.proceed(own, state.as_ref());
             }
             match served {
-                Served::Runs(trajectory, aim) => self.keep(backend, slot, (rank, trajectory), aim),
-                Served::Over(ended) => {
+                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
+                Served::Over(rank, ended) => {
                     backend.clear(slot);
                     queue.leave(rank, *ended, sink)?;
                 }
@@ -467,7 +490,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Lets a member continue in its slot.
-    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: (u64, Trajectory<'a>), aim: Option<Aim>) {
+    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: Resident<'a>, aim: Option<Aim>) {
         self.resident[slot] = Some(own);
         if let Some((goal, parameters)) = aim {
             backend.aim(slot, goal, &parameters);
@@ -476,7 +499,7 @@ impl<'a> Pool<'a> {
 
     /// Passes all rows in memory to the sink if they exceed `most` bytes.
     fn relieve(&mut self, queue: &mut Queue, most: usize, sink: &mut dyn Sink) -> Result<()> {
-        let own = self.resident.iter_mut().flatten().map(|(_, trajectory)| trajectory.rows());
+        let own = self.resident.iter_mut().flatten().map(|own| own.trajectory.rows());
         let own = own.chain(self.paused.values_mut().map(|paused| &mut paused.rows));
         let all: Vec<&mut Rows> = own.chain(queue.early.values_mut().map(|ended| &mut ended.rows)).collect();
         self.held = all.iter().map(|rows| rows.bytes()).sum();
@@ -494,7 +517,15 @@ impl<'a> Pool<'a> {
 
     /// Work done on the resident members, in members.
     fn share(&self) -> f64 {
-        self.resident.iter().flatten().map(|(_, trajectory)| trajectory.share()).sum()
+        self.resident.iter().flatten().map(|own| own.trajectory.share()).sum()
+    }
+
+    /// Whether all members in progress began in the second half of the time from `then` to `now`: to begin them again
+    /// costs less than to save their states.
+    fn are_young(&self, then: Instant, now: Instant) -> bool {
+        let most = (now - then) / 2;
+        let is_young = |own: &Resident| own.begun.is_some_and(|begun| now - begun <= most);
+        self.paused.is_empty() && self.resident.iter().flatten().all(is_young)
     }
 }
 
@@ -504,6 +535,8 @@ struct Queue {
     ended: u64,
     next: u64,
     early: BTreeMap<u64, Ended>,
+    /// When the progress was last saved, or the run began.
+    saved: Instant,
     /// Whether the sink has saved the progress of the run, to the last member.
     kept: bool,
     /// When the sink was last notified of the progress.
@@ -534,6 +567,7 @@ impl Queue {
         let progress = RunProgress { next: self.next, early: std::mem::take(&mut self.early), resident };
         let done = sink.checkpoint(&progress);
         self.kept = done.is_ok() && progress.resident.is_some();
+        self.saved = Instant::now();
         self.early = progress.early;
         done
     }
@@ -605,6 +639,27 @@ mod tests {
             self.0 -= 1;
             if self.0 == 0 { Err(Error::Stopped("no patience".into())) } else { Ok(()) }
         }
+    }
+
+    #[test]
+    fn only_members_that_began_a_short_while_ago_are_left_out_of_a_checkpoint() {
+        let study = Study::new(Spec { curves: 3, ..Spec::default() }).unwrap();
+        let roster = Roster::new(study.cells(), Precision::F64, 0);
+        let second = Duration::from_secs(1);
+        let now = Instant::now() + 10 * second;
+        let then = now - 8 * second;
+        let resident = |begun| Some(Resident { rank: 0, trajectory: roster.create((0, 0)).unwrap(), begun });
+        let pool = |begun: &[Option<Instant>]| Pool {
+            roster: &roster,
+            resident: begun.iter().map(|begun| resident(*begun)).chain([None]).collect(),
+            paused: BTreeMap::new(),
+            held: 0,
+        };
+        let [late, early] = [now - 3 * second, now - 5 * second].map(Some);
+        let are_young = |begun: &[Option<Instant>]| pool(begun).are_young(then, now);
+        assert!(are_young(&[]) && are_young(&[late]) && are_young(&[late, late]));
+        // Some work of a member that continues is older than it looks.
+        assert!(!are_young(&[early]) && !are_young(&[late, early]) && !are_young(&[late, None]));
     }
 
     #[test]

@@ -136,11 +136,24 @@ impl<T: Real> Batch<T> {
         self.buffers.bound.get(Binding::Trace as usize)
     }
 
-    /// Puts a member, whose state is `rows`, into a slot.
-    pub fn load(&mut self, device: &OpenGpu, slot: usize, run: &Run<T>, rows: &[T]) {
-        self.mirror.load(slot, run);
-        let (states, offset, _) = self.state_at(slot);
-        device.queue.write_buffer(states, offset, bytemuck::cast_slice(rows));
+    /// Puts members, each with the rows of its state, into consecutive slots.
+    pub fn load<'a>(
+        &mut self,
+        device: &OpenGpu,
+        first: usize,
+        members: impl ExactSizeIterator<Item = (&'a Run<T>, &'a [T])>,
+    ) {
+        let (states, offset, bytes) = self.state_at(first);
+        let all = wgpu::BufferSize::new(bytes * members.len() as u64);
+        // A fault is reported to the device.
+        let mut view = all.and_then(|all| device.queue.write_buffer_with(states, offset, all));
+        for (i, (run, rows)) in members.enumerate() {
+            self.mirror.load(first + i, run);
+            if let Some(view) = &mut view {
+                let from = i * bytes as usize;
+                view.slice(from..from + bytes as usize).copy_from_slice(bytemuck::cast_slice(rows));
+            }
+        }
     }
 
     /// Dispatches the members that are due, if any.

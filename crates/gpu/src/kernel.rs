@@ -216,9 +216,13 @@ impl<T: Real> Backend for Kernel<T> {
             let rows = to_rows(blocks, &run.state);
             (slot, run, rows)
         });
-        for (slot, run, rows) in prepared {
-            let (batch, at) = (slot / self.slots_per_batch, slot % self.slots_per_batch);
-            self.batches[batch].load(&self.gpu, at, &run, &rows);
+        // Neighbours go to the device together.
+        let are_neighbours =
+            |a: &(usize, _, _), b: &(usize, _, _)| b.0 == a.0 + 1 && !b.0.is_multiple_of(self.slots_per_batch);
+        for together in prepared.chunk_by(are_neighbours) {
+            let first = together[0].0;
+            let batch = &mut self.batches[first / self.slots_per_batch];
+            batch.load(&self.gpu, first % self.slots_per_batch, together.iter().map(|(_, run, rows)| (run, &rows[..])));
         }
         self.gpu.check()
     }
