@@ -278,9 +278,9 @@ mod tests {
             threads: None,
         };
         let (members, start_up) = (vec![run], Duration::ZERO);
-        let mut bench = Bench { backend: Box::new(backend), platform, members, made: vec![0; 2], stride, start_up };
-        bench.load(0).unwrap();
-        bench.load(1).unwrap();
+        let (backend, threads, made) = (Box::new(backend), HostThreads::new(1), vec![0; 2]);
+        let mut bench = Bench { backend, platform, members, threads, made, stride, start_up };
+        bench.load(vec![0, 1]).unwrap();
         (bench, steps, loads)
     }
 

@@ -1,0 +1,246 @@
+//! The slots of a back end: what is done with the members in them between two dispatches.
+
+use std::{collections::BTreeMap, ops::Range, time::Instant};
+
+use super::{
+    MAX_WAIT,
+    queue::Queue,
+    roster::{Admitted, Aim, Entering, Resident, Roster, Served},
+};
+use crate::{Paused, Rows, Sink};
+use curvelax_backend::Backend;
+use curvelax_base::error::Result;
+use curvelax_flow::scheme::state::STATE_FIELDS;
+
+/// Maximum states read back at once for a checkpoint, and their maximum bytes.
+const READ_BACK: usize = 512;
+const BYTES_READ_BACK: usize = 64 << 20;
+
+/// Bytes of rows in memory above which all are passed to the sink; also the maximum of one member.
+pub const MAX_HELD: usize = 32 << 20;
+const MAX_OF_ONE: usize = 8 << 20;
+
+/// Returns how many states of `n` nodes may be read back at once.
+pub fn states_at_once(n: usize) -> usize {
+    (BYTES_READ_BACK / (STATE_FIELDS * size_of::<f64>() * n)).max(1)
+}
+
+/// The resident members of a run.
+pub(super) struct Pool<'a> {
+    pub roster: &'a Roster<'a>,
+    pub resident: Vec<Option<Resident<'a>>>,
+    /// Members that continue from a checkpoint, by rank.
+    pub paused: BTreeMap<u64, Paused>,
+    /// Bound on the bytes of rows in memory, including members that ended early.
+    pub held: usize,
+}
+
+impl<'a> Pool<'a> {
+    /// Puts members into free slots, each with its rank in this run; returns the slots of those that end at once,
+    /// because there is nothing to do.
+    pub fn admit(
+        &mut self,
+        backend: &mut dyn Backend,
+        entering: Vec<(usize, Entering)>,
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<Vec<usize>> {
+        let roster = self.roster;
+        let with_paused = |(slot, (rank, who))| (slot, rank, who, self.paused.remove(&rank));
+        let entering = entering.into_iter().map(with_paused).collect();
+        let admitted = roster.threads.map(entering, |(slot, rank, who, paused)| {
+            let begun = paused.is_none().then(Instant::now);
+            (slot, rank, begun, roster.admit(who, paused))
+        });
+        let (mut over, mut runs, mut failed) = (Vec::new(), Vec::new(), Ok(()));
+        for (slot, rank, begun, admitted) in admitted {
+            match admitted {
+                Ok(Admitted::Over(ended)) => {
+                    over.push(slot);
+                    queue.leave(rank, *ended, sink)?;
+                }
+                Ok(Admitted::Runs(own)) => {
+                    let (mut trajectory, run) = *own;
+                    self.held += trajectory.rows().bytes();
+                    self.resident[slot] = Some(Resident { rank, trajectory, begun });
+                    runs.push((slot, run));
+                }
+                Err(error) => {
+                    failed = Err(error);
+                    break;
+                }
+            }
+        }
+
+        backend.load_all(runs, &roster.threads)?;
+        failed.map(|()| over)
+    }
+
+    /// Nodes of a member.
+    pub fn points(&self) -> usize {
+        self.roster.cells.first().map_or(1, |cell| cell.family.points())
+    }
+
+    /// All unfinished members; none may be in a batch that is being advanced.
+    pub fn pause(&self, backend: &mut dyn Backend) -> Result<BTreeMap<u64, Paused>> {
+        let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
+        let occupied: Vec<_> = occupied.collect();
+        let mut all = self.paused.clone();
+        for part in occupied.chunks(states_at_once(self.points()).min(READ_BACK)) {
+            let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
+            for ((slot, own), state) in part.iter().zip(backend.states(&slots)?) {
+                all.insert(own.rank, own.trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
+            }
+        }
+        Ok(all)
+    }
+
+    /// Processes the members in `slots`: serves their output times, and sets their next goals or lets them leave.
+    pub fn collect(
+        &mut self,
+        backend: &mut dyn Backend,
+        slots: Range<usize>,
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<()> {
+        let occupied: Vec<usize> = slots.filter(|slot| self.resident[*slot].is_some()).collect();
+        occupied
+            .chunks(states_at_once(self.points()))
+            .try_for_each(|part| self.collect_part(backend, part, queue, sink))
+    }
+
+    fn collect_part(
+        &mut self,
+        backend: &mut dyn Backend,
+        slots: &[usize],
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<()> {
+        let mut wanted = Vec::new();
+        for slot in slots.iter().copied() {
+            let Some(Resident { trajectory, .. }) = &mut self.resident[slot] else { continue };
+            trajectory.observe(backend.counters(slot), &backend.report(slot));
+            if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
+                wanted.push(slot);
+            }
+        }
+        // One transfer for all.
+        let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
+        let roster = self.roster;
+        let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
+        let taken: Vec<_> = slots.iter().filter_map(take).collect();
+        let share = MAX_HELD / taken.len().max(1);
+        let served = roster.threads.map(taken, |(slot, mut own, state)| {
+            let before = own.trajectory.rows().bytes();
+            let all = own.trajectory.serve(state.as_ref(), before + share);
+            let more = own.trajectory.rows().bytes().saturating_sub(before);
+            (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state) }, more)
+        });
+        let mut rest = Vec::new();
+        for (slot, served, more) in served {
+            self.held += more;
+            match served {
+                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
+                other => rest.push((slot, other)),
+            }
+        }
+        for (slot, mut served) in rest {
+            if let Served::Full(mut own, state) = served {
+                let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
+                // One step may pass more output times than memory has room for.
+                while !own.trajectory.serve(state.as_ref(), most) {
+                    most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
+                }
+                self.held += own.trajectory.rows().bytes().saturating_sub(before);
+                served = roster.proceed(own, state.as_ref());
+            }
+            match served {
+                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
+                Served::Over(rank, ended) => {
+                    backend.clear(slot);
+                    queue.leave(rank, *ended, sink)?;
+                }
+                Served::Full(..) => unreachable!("all output times have been served"),
+            }
+            if self.held > MAX_HELD {
+                self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
+            }
+            // Many rows take long to write, so the sink is notified in between.
+            if queue.told.elapsed() >= MAX_WAIT {
+                queue.tell(self, sink)?;
+            }
+        }
+        if self.held > MAX_HELD {
+            self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
+        }
+        Ok(())
+    }
+
+    /// Lets a member continue in its slot.
+    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: Resident<'a>, aim: Option<Aim>) {
+        self.resident[slot] = Some(own);
+        if let Some((goal, parameters)) = aim {
+            backend.aim(slot, goal, &parameters);
+        }
+    }
+
+    /// Passes all rows in memory to the sink if they exceed `most` bytes.
+    pub fn relieve(&mut self, queue: &mut Queue, most: usize, sink: &mut dyn Sink) -> Result<()> {
+        let own = self.resident.iter_mut().flatten().map(|own| own.trajectory.rows());
+        let own = own.chain(self.paused.values_mut().map(|paused| &mut paused.rows));
+        let all: Vec<&mut Rows> = own.chain(queue.early.values_mut().map(|ended| &mut ended.rows)).collect();
+        self.held = all.iter().map(|rows| rows.bytes()).sum();
+        if self.held <= most {
+            return Ok(());
+        }
+        self.held = 0;
+        for rows in all {
+            if !rows.spill(sink)? {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Work done on the resident members, in members.
+    pub fn share(&self) -> f64 {
+        self.resident.iter().flatten().map(|own| own.trajectory.share()).sum()
+    }
+
+    /// Whether all members in progress began in the second half of the time from `then` to `now`: to begin them again
+    /// costs less than to save their states.
+    pub fn are_young(&self, then: Instant, now: Instant) -> bool {
+        let most = (now - then) / 2;
+        let is_young = |own: &Resident| own.begun.is_some_and(|begun| now - begun <= most);
+        self.paused.is_empty() && self.resident.iter().flatten().all(is_young)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::{Spec, Study, request::spec::Precision};
+
+    #[test]
+    fn only_members_that_began_a_short_while_ago_are_left_out_of_a_checkpoint() {
+        let study = Study::new(Spec { curves: 3, ..Spec::default() }).unwrap();
+        let roster = Roster::new(study.cells(), Precision::F64, 0);
+        let second = Duration::from_secs(1);
+        let now = Instant::now() + 10 * second;
+        let then = now - 8 * second;
+        let resident = |begun| Some(Resident { rank: 0, trajectory: roster.create((0, 0)).unwrap(), begun });
+        let pool = |begun: &[Option<Instant>]| Pool {
+            roster: &roster,
+            resident: begun.iter().map(|begun| resident(*begun)).chain([None]).collect(),
+            paused: BTreeMap::new(),
+            held: 0,
+        };
+        let [late, early] = [now - 3 * second, now - 5 * second].map(Some);
+        let are_young = |begun: &[Option<Instant>]| pool(begun).are_young(then, now);
+        assert!(are_young(&[]) && are_young(&[late]) && are_young(&[late, late]));
+        // Some work of a member that continues is older than it looks.
+        assert!(!are_young(&[early]) && !are_young(&[late, early]) && !are_young(&[late, None]));
+    }
+}
