@@ -196,7 +196,7 @@ class Keys(TypedDict, total=False):
     """Number type. By default f64 where the device has it."""
 
     threads: int
-    """Threads of the CPU back end. By default all cores."""
+    """Threads that make and evaluate members and, on the CPU, advance them. By default all cores."""
 
     event: str | Sequence[str]
     """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A

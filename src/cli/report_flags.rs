@@ -35,7 +35,8 @@ pub struct ReportFlags {
     /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues
     #[arg(long, value_name = "DURATION", value_parser = parsers::duration, allow_hyphen_values = true, help_heading = flags::OUTPUT)]
     max_time: Option<Duration>,
-    /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most this much work
+    /// Interval between checkpoints for `curvelax resume`: a run that is killed loses at most one and a half times this
+    /// much work
     #[arg(
         long, value_name = "DURATION", value_parser = parsers::duration, allow_hyphen_values = true, default_value = "5s",
         help_heading = flags::OUTPUT

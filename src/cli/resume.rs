@@ -34,7 +34,8 @@ pub struct ResumeArgs {
     /// Continue on this GPU adapter, given by a part of its name [default: the one on which it began]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
-    /// Threads of the CPU back end [default: as in the spec, otherwise all cores]
+    /// Threads that make and evaluate members and, on the CPU, advance them [default: as in the spec, otherwise all
+    /// cores]
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
     threads: Option<usize>,
     #[command(flatten)]

@@ -336,7 +336,7 @@ keys! {
         /// [default: all]
         #[serde(skip_serializing_if = "Option::is_none")]
         shard: Option<Shard> = None, "I/N", Ensemble;
-        /// Threads of the CPU back end [default: all cores]
+        /// Threads that make and evaluate members and, on the CPU, advance them [default: all cores]
         #[serde(skip_serializing_if = "Option::is_none")]
         threads: Option<usize> = None, "COUNT", Machine;
         /// Draw member j of every cell from the same random numbers [default: false]

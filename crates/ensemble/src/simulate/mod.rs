@@ -19,15 +19,12 @@ use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
 use pool::Pool;
 pub use pool::{MAX_HELD, states_at_once};
-use queue::Queue;
+use queue::{MAX_WAIT, Queue};
 use roster::Entering;
 pub use roster::Roster;
 
 /// Members that may wait for the first unfinished one, in multiples of the slots; beyond, no member is admitted.
 const MEMBERS_AHEAD: usize = 8;
-
-/// Interval at which the sink is notified, and may stop the run, during longer dispatches.
-const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Maximum members that are created at once, and roughly that end at their creation between two calls of the sink.
 const MAX_AT_ONCE: usize = 1000;
@@ -159,7 +156,7 @@ impl<'a> Simulation<'a> {
         let slots = *batch * size..(*batch + 1) * size;
         if on_the_way[*batch] {
             if !backend.is_back(*batch, MAX_WAIT) {
-                queue.tell(pool, sink)?;
+                queue.tell(pool.share(), sink)?;
                 *told = *told || queue.checkpoint_before_the_stop(sink)?;
                 return Ok(true);
             }
@@ -181,18 +178,21 @@ impl<'a> Simulation<'a> {
             over += ended.len();
             free.extend(ended);
         }
-        queue.tell(pool, sink)?;
+        queue.tell(pool.share(), sink)?;
         if pool.resident.iter().all(Option::is_none) && waiting.peek().is_none() {
             return Ok(false);
         }
         let request = sink.next_request();
         let continues = matches!(request, SinkRequest::Continue);
-        if matches!(request, SinkRequest::Checkpoint) && pool.are_young(queue.saved, Instant::now()) {
-            queue.checkpoint(None, sink)?;
-        } else if !continues && !on_the_way.contains(&true) {
-            // A checkpoint of members in progress needs all batches back.
+        let saved = match request {
+            SinkRequest::Continue => Vec::new(),
+            SinkRequest::Checkpoint => pool.old(queue.saved, Instant::now()),
+            SinkRequest::Stop(_) => pool.occupied(),
+        };
+        // To save members in progress, all batches must be back.
+        if !continues && (saved.is_empty() || !on_the_way.contains(&true)) {
             pool.relieve(queue, MAX_KEPT, sink)?;
-            queue.checkpoint(Some(pool.pause(backend)?), sink)?;
+            queue.checkpoint(Some(pool.pause(backend, &saved)?), sink)?;
             if let SinkRequest::Stop(error) = request {
                 return Err(error);
             }

@@ -3,8 +3,7 @@
 use std::{collections::BTreeMap, ops::Range, time::Instant};
 
 use super::{
-    MAX_WAIT,
-    queue::Queue,
+    queue::{MAX_WAIT, Queue},
     roster::{Admitted, Aim, Entering, Resident, Roster, Served},
 };
 use crate::{Paused, Rows, Sink};
@@ -28,7 +27,7 @@ pub fn states_at_once(n: usize) -> usize {
 /// The resident members of a run.
 pub(super) struct Pool<'a> {
     pub roster: &'a Roster<'a>,
-    pub resident: Vec<Option<Resident<'a>>>,
+    pub resident: Vec<Option<Box<Resident<'a>>>>,
     /// Members that continue from a checkpoint, by rank.
     pub paused: BTreeMap<u64, Paused>,
     /// Bound on the bytes of rows in memory, including members that ended early.
@@ -62,7 +61,7 @@ impl<'a> Pool<'a> {
                 Ok(Admitted::Runs(own)) => {
                     let (mut trajectory, run) = *own;
                     self.held += trajectory.rows().bytes();
-                    self.resident[slot] = Some(Resident { rank, trajectory, begun });
+                    self.resident[slot] = Some(Box::new(Resident { rank, trajectory, begun }));
                     runs.push((slot, run));
                 }
                 Err(error) => {
@@ -71,7 +70,6 @@ impl<'a> Pool<'a> {
                 }
             }
         }
-
         backend.load_all(runs, &roster.threads)?;
         failed.map(|()| over)
     }
@@ -81,14 +79,26 @@ impl<'a> Pool<'a> {
         self.roster.cells.first().map_or(1, |cell| cell.family.points())
     }
 
-    /// All unfinished members; none may be in a batch that is being advanced.
-    pub fn pause(&self, backend: &mut dyn Backend) -> Result<BTreeMap<u64, Paused>> {
-        let occupied = self.resident.iter().enumerate().filter_map(|(slot, own)| Some((slot, own.as_ref()?)));
-        let occupied: Vec<_> = occupied.collect();
+    /// The slots with members.
+    pub fn occupied(&self) -> Vec<usize> {
+        (0..self.resident.len()).filter(|slot| self.resident[*slot].is_some()).collect()
+    }
+
+    /// The slots of members that began in the first half of the time from `then` to `now` or earlier. To begin the
+    /// others again costs less than to save their states.
+    pub fn old(&self, then: Instant, now: Instant) -> Vec<usize> {
+        let most = (now - then) / 2;
+        let is_old = |own: &Resident| own.begun.is_none_or(|begun| now - begun > most);
+        (0..self.resident.len()).filter(|slot| self.resident[*slot].as_deref().is_some_and(is_old)).collect()
+    }
+
+    /// The unfinished members in `slots`, and those that wait to be continued; no batch may be on the way if there are
+    /// any slots.
+    pub fn pause(&self, backend: &mut dyn Backend, slots: &[usize]) -> Result<BTreeMap<u64, Paused>> {
         let mut all = self.paused.clone();
-        for part in occupied.chunks(states_at_once(self.points()).min(READ_BACK)) {
-            let slots: Vec<usize> = part.iter().map(|(slot, _)| *slot).collect();
-            for ((slot, own), state) in part.iter().zip(backend.states(&slots)?) {
+        for part in slots.chunks(states_at_once(self.points()).min(READ_BACK)) {
+            for (slot, state) in part.iter().zip(backend.states(part)?) {
+                let Some(own) = &self.resident[*slot] else { continue };
                 all.insert(own.rank, own.trajectory.pause(backend.counters(*slot), backend.report(*slot), &state));
             }
         }
@@ -118,7 +128,8 @@ impl<'a> Pool<'a> {
     ) -> Result<()> {
         let mut wanted = Vec::new();
         for slot in slots.iter().copied() {
-            let Some(Resident { trajectory, .. }) = &mut self.resident[slot] else { continue };
+            let Some(own) = &mut self.resident[slot] else { continue };
+            let trajectory = &mut own.trajectory;
             trajectory.observe(backend.counters(slot), &backend.report(slot));
             if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
                 wanted.push(slot);
@@ -134,7 +145,7 @@ impl<'a> Pool<'a> {
             let before = own.trajectory.rows().bytes();
             let all = own.trajectory.serve(state.as_ref(), before + share);
             let more = own.trajectory.rows().bytes().saturating_sub(before);
-            (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state) }, more)
+            (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state.map(Box::new)) }, more)
         });
         let mut rest = Vec::new();
         for (slot, served, more) in served {
@@ -148,11 +159,11 @@ impl<'a> Pool<'a> {
             if let Served::Full(mut own, state) = served {
                 let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
                 // One step may pass more output times than memory has room for.
-                while !own.trajectory.serve(state.as_ref(), most) {
+                while !own.trajectory.serve(state.as_deref(), most) {
                     most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
                 }
                 self.held += own.trajectory.rows().bytes().saturating_sub(before);
-                served = roster.proceed(own, state.as_ref());
+                served = roster.proceed(own, state.as_deref());
             }
             match served {
                 Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
@@ -167,7 +178,7 @@ impl<'a> Pool<'a> {
             }
             // Many rows take long to write, so the sink is notified in between.
             if queue.told.elapsed() >= MAX_WAIT {
-                queue.tell(self, sink)?;
+                queue.tell(self.share(), sink)?;
             }
         }
         if self.held > MAX_HELD {
@@ -177,9 +188,10 @@ impl<'a> Pool<'a> {
     }
 
     /// Lets a member continue in its slot.
-    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: Resident<'a>, aim: Option<Aim>) {
+    fn keep(&mut self, backend: &mut dyn Backend, slot: usize, own: Box<Resident<'a>>, aim: Option<Box<Aim>>) {
         self.resident[slot] = Some(own);
-        if let Some((goal, parameters)) = aim {
+        if let Some(aim) = aim {
+            let (goal, parameters) = *aim;
             backend.aim(slot, goal, &parameters);
         }
     }
@@ -206,14 +218,6 @@ impl<'a> Pool<'a> {
     pub fn share(&self) -> f64 {
         self.resident.iter().flatten().map(|own| own.trajectory.share()).sum()
     }
-
-    /// Whether all members in progress began in the second half of the time from `then` to `now`: to begin them again
-    /// costs less than to save their states.
-    pub fn are_young(&self, then: Instant, now: Instant) -> bool {
-        let most = (now - then) / 2;
-        let is_young = |own: &Resident| own.begun.is_some_and(|begun| now - begun <= most);
-        self.paused.is_empty() && self.resident.iter().flatten().all(is_young)
-    }
 }
 
 #[cfg(test)]
@@ -224,13 +228,13 @@ mod tests {
     use crate::{Spec, Study, request::spec::Precision};
 
     #[test]
-    fn only_members_that_began_a_short_while_ago_are_left_out_of_a_checkpoint() {
+    fn members_that_began_a_short_while_ago_are_left_out_of_a_checkpoint() {
         let study = Study::new(Spec { curves: 3, ..Spec::default() }).unwrap();
         let roster = Roster::new(study.cells(), Precision::F64, 0);
         let second = Duration::from_secs(1);
         let now = Instant::now() + 10 * second;
         let then = now - 8 * second;
-        let resident = |begun| Some(Resident { rank: 0, trajectory: roster.create((0, 0)).unwrap(), begun });
+        let resident = |begun| Some(Box::new(Resident { rank: 0, trajectory: roster.create((0, 0)).unwrap(), begun }));
         let pool = |begun: &[Option<Instant>]| Pool {
             roster: &roster,
             resident: begun.iter().map(|begun| resident(*begun)).chain([None]).collect(),
@@ -238,9 +242,10 @@ mod tests {
             held: 0,
         };
         let [late, early] = [now - 3 * second, now - 5 * second].map(Some);
-        let are_young = |begun: &[Option<Instant>]| pool(begun).are_young(then, now);
-        assert!(are_young(&[]) && are_young(&[late]) && are_young(&[late, late]));
+        let old = |begun: &[Option<Instant>]| pool(begun).old(then, now);
+        assert!(old(&[]).is_empty());
         // Some work of a member that continues is older than it looks.
-        assert!(!are_young(&[early]) && !are_young(&[late, early]) && !are_young(&[late, None]));
+        assert_eq!(old(&[late, early, late, None]), [1, 3]);
+        assert_eq!(pool(&[late, early]).occupied(), [0, 1]);
     }
 }

@@ -1,10 +1,15 @@
-//! Members that have ended, on their way to the sink in member order.
+//! Members that have ended, until the sink has them in member order.
 
-use std::{collections::BTreeMap, time::Instant};
+use std::{
+    collections::BTreeMap,
+    time::{Duration, Instant},
+};
 
-use super::pool::Pool;
 use crate::{Ended, Paused, RunProgress, Sink, SinkRequest};
 use curvelax_base::error::Result;
+
+/// Interval at which the sink is notified, and may stop the run, during longer dispatches.
+pub const MAX_WAIT: Duration = Duration::from_millis(200);
 
 /// Members that have ended, held until those before them have.
 pub(super) struct Queue {
@@ -22,9 +27,9 @@ pub(super) struct Queue {
 
 impl Queue {
     /// Reports the progress to the sink, which may end the run at once.
-    pub fn tell(&mut self, pool: &Pool, sink: &mut dyn Sink) -> Result<()> {
+    pub fn tell(&mut self, share: f64, sink: &mut dyn Sink) -> Result<()> {
         self.told = Instant::now();
-        let work = self.ended as f64 + pool.share();
+        let work = self.ended as f64 + share;
         sink.progress(self.ended, self.total, work / self.total as f64)
     }
 

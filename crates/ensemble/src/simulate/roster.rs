@@ -13,7 +13,7 @@ use crate::{
 use curvelax_base::{error::Result, threads::HostThreads};
 use curvelax_flow::scheme::{Parameters, State, member, run::Run};
 
-/// The members of a [`Simulation`], and when they leave something during it.
+/// The members of a [`Simulation`](super::Simulation), and when they leave something during it.
 pub struct Roster<'a> {
     pub(super) cells: &'a [Cell],
     precision: Precision,
@@ -24,7 +24,7 @@ pub struct Roster<'a> {
 }
 
 impl<'a> Roster<'a> {
-    /// Lists the members of `cells` as [`simulate`] does.
+    /// Lists the members of `cells` as [`simulate`](super::simulate) does.
     pub fn new(cells: &'a [Cell], precision: Precision, portraits: usize) -> Roster<'a> {
         let outputs = |framed: bool| -> Vec<_> {
             let of_cell = |Cell { spec, .. }: &Cell| {
@@ -77,11 +77,11 @@ impl<'a> Roster<'a> {
     }
 
     /// Sets the next goal of a member whose output times have been served, or ends it.
-    pub(super) fn proceed<'b>(&self, own: Resident<'b>, state: Option<&State<f64>>) -> Served<'b> {
+    pub(super) fn proceed<'b>(&self, own: Box<Resident<'b>>, state: Option<&State<f64>>) -> Served<'b> {
         if own.trajectory.is_over() {
             return Served::Over(own.rank, Box::new(self.end(own.trajectory, state)));
         }
-        let aim = own.trajectory.next_aim();
+        let aim = own.trajectory.next_aim().map(Box::new);
         Served::Runs(own, aim)
     }
 }
@@ -103,9 +103,9 @@ pub(super) enum Served<'a> {
     /// With its rank.
     Over(u64, Box<Ended>),
     /// With another goal, if it has one.
-    Runs(Resident<'a>, Option<Aim>),
+    Runs(Box<Resident<'a>>, Option<Box<Aim>>),
     /// Its rows fill the memory that it has before all output times are served; with its state.
-    Full(Resident<'a>, Option<State<f64>>),
+    Full(Box<Resident<'a>>, Option<Box<State<f64>>>),
 }
 
 /// A member in a slot.

@@ -44,7 +44,7 @@ pub struct ResumePlace {
     pub backend: Option<BackendChoice>,
     /// A part of the name of the GPU adapter.
     pub adapter: Option<String>,
-    /// Threads of the CPU back end.
+    /// Threads of the host and of the CPU back end.
     pub threads: Option<usize>,
     /// Why, if not because it was requested.
     pub why: Option<String>,
