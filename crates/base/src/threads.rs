@@ -73,12 +73,16 @@ impl HostThreads {
         HostThreads { count, pool: OnceLock::new() }
     }
 
+    /// Returns whether these threads share the work on so many items.
+    pub fn share(&self, items: usize) -> bool {
+        self.count != 1 && items >= Self::MIN_ITEMS && !cfg!(target_family = "wasm")
+    }
+
     /// Returns `of` for each item, in order: on these threads, or on the thread that asks if there is little to do, if
     /// one is enough, or if the system starts no more of them.
     pub fn map<T: Send, R: Send>(&self, items: Vec<T>, of: impl Fn(T) -> R + Send + Sync) -> Vec<R> {
-        let alone = self.count == 1 || cfg!(target_family = "wasm");
         let start = || ThreadPoolBuilder::new().num_threads(self.count).build().ok();
-        match if alone || items.len() < Self::MIN_ITEMS { &None } else { self.pool.get_or_init(start) } {
+        match if self.share(items.len()) { self.pool.get_or_init(start) } else { &None } {
             Some(pool) => pool.install(|| items.into_par_iter().map(of).collect()),
             None => items.into_iter().map(of).collect(),
         }

@@ -11,7 +11,7 @@ mod roster;
 use std::{
     collections::{BTreeSet, VecDeque},
     iter::Peekable,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use crate::{Cell, Ended, RunProgress, Sink, SinkRequest, request::spec::Precision, trajectory::Trajectory};
@@ -218,6 +218,8 @@ impl<'a> Simulation<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
     use crate::{Spec, Study};
     use curvelax_flow::scheme::{

@@ -6,7 +6,7 @@ use super::{
     queue::{MAX_WAIT, Queue},
     roster::{Admitted, Aim, Entering, Resident, Roster, Served},
 };
-use crate::{Paused, Rows, Sink};
+use crate::{Ended, Paused, Rows, Sink};
 use curvelax_backend::Backend;
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::state::STATE_FIELDS;
@@ -140,49 +140,63 @@ impl<'a> Pool<'a> {
         let roster = self.roster;
         let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
         let taken: Vec<_> = slots.iter().filter_map(take).collect();
-        let share = MAX_HELD / taken.len().max(1);
+        // Rows may take twice the memory that they fill. One after another, members free theirs for the next.
+        let room = if roster.threads.share(taken.len()) { MAX_HELD.saturating_sub(self.held) / 2 } else { 0 };
+        let each = room / taken.len().max(1);
         let served = roster.threads.map(taken, |(slot, mut own, state)| {
             let before = own.trajectory.rows().bytes();
-            let all = own.trajectory.serve(state.as_ref(), before + share);
+            let all = own.trajectory.serve(state.as_ref(), before + each);
             let more = own.trajectory.rows().bytes().saturating_sub(before);
             (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state.map(Box::new)) }, more)
         });
-        let mut rest = Vec::new();
+        let (mut over, mut full) = (Vec::new(), Vec::new());
         for (slot, served, more) in served {
             self.held += more;
             match served {
                 Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
-                other => rest.push((slot, other)),
+                Served::Over(rank, ended) => over.push((slot, rank, ended)),
+                Served::Full(own, state) => {
+                    self.resident[slot] = Some(own);
+                    full.push((slot, state));
+                }
             }
         }
-        for (slot, mut served) in rest {
-            if let Served::Full(mut own, state) = served {
-                let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
-                // One step may pass more output times than memory has room for.
-                while !own.trajectory.serve(state.as_deref(), most) {
-                    most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
-                }
-                self.held += own.trajectory.rows().bytes().saturating_sub(before);
-                served = roster.proceed(own, state.as_deref());
+        for (slot, rank, ended) in over {
+            backend.clear(slot);
+            self.leave(rank, *ended, queue, sink)?;
+        }
+        for (slot, state) in full {
+            let Some(mut own) = self.resident[slot].take() else { continue };
+            let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
+            // One step may pass more output times than memory has room for.
+            while !own.trajectory.serve(state.as_deref(), most) {
+                most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
             }
-            match served {
+            self.held += own.trajectory.rows().bytes().saturating_sub(before);
+            match roster.proceed(own, state.as_deref()) {
                 Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
                 Served::Over(rank, ended) => {
                     backend.clear(slot);
-                    queue.leave(rank, *ended, sink)?;
+                    self.leave(rank, *ended, queue, sink)?;
                 }
                 Served::Full(..) => unreachable!("all output times have been served"),
             }
             if self.held > MAX_HELD {
                 self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
             }
-            // Many rows take long to write, so the sink is notified in between.
-            if queue.told.elapsed() >= MAX_WAIT {
-                queue.tell(self.share(), sink)?;
-            }
         }
+        Ok(())
+    }
+
+    /// Passes a member that has ended to the queue.
+    fn leave(&mut self, rank: u64, ended: Ended, queue: &mut Queue, sink: &mut dyn Sink) -> Result<()> {
+        queue.leave(rank, ended, sink)?;
         if self.held > MAX_HELD {
             self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
+        }
+        // Many rows take long to write, so the sink is notified in between.
+        if queue.told.elapsed() >= MAX_WAIT {
+            queue.tell(self.share(), sink)?;
         }
         Ok(())
     }
