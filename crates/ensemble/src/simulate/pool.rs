@@ -6,7 +6,7 @@ use super::{
     queue::{MAX_WAIT, Queue},
     roster::{Admitted, Aim, Entering, Resident, Roster, Served},
 };
-use crate::{Ended, Paused, Rows, Sink};
+use crate::{Paused, Rows, Sink};
 use curvelax_backend::Backend;
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::state::STATE_FIELDS;
@@ -161,9 +161,12 @@ impl<'a> Pool<'a> {
                 }
             }
         }
+        let mut left = over.len();
         for (slot, rank, ended) in over {
             backend.clear(slot);
-            self.leave(rank, *ended, queue, sink)?;
+            queue.leave(rank, *ended, sink)?;
+            left -= 1;
+            self.bound(queue, left, sink)?;
         }
         for (slot, state) in full {
             let Some(mut own) = self.resident[slot].take() else { continue };
@@ -177,26 +180,23 @@ impl<'a> Pool<'a> {
                 Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
                 Served::Over(rank, ended) => {
                     backend.clear(slot);
-                    self.leave(rank, *ended, queue, sink)?;
+                    queue.leave(rank, *ended, sink)?;
                 }
                 Served::Full(..) => unreachable!("all output times have been served"),
             }
-            if self.held > MAX_HELD {
-                self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
-            }
+            self.bound(queue, 0, sink)?;
         }
         Ok(())
     }
 
-    /// Passes a member that has ended to the queue.
-    fn leave(&mut self, rank: u64, ended: Ended, queue: &mut Queue, sink: &mut dyn Sink) -> Result<()> {
-        queue.leave(rank, ended, sink)?;
+    /// Bounds the rows in memory, and the time until the sink is notified, since many rows take long to write; `left`
+    /// members that have ended are not in the queue yet.
+    fn bound(&mut self, queue: &mut Queue, left: usize, sink: &mut dyn Sink) -> Result<()> {
         if self.held > MAX_HELD {
             self.relieve(queue, MAX_HELD / 4 * 3, sink)?;
         }
-        // Many rows take long to write, so the sink is notified in between.
         if queue.told.elapsed() >= MAX_WAIT {
-            queue.tell(self.share(), sink)?;
+            queue.tell(self.share() + left as f64, sink)?;
         }
         Ok(())
     }
