@@ -40,6 +40,23 @@ impl<'a> Pool<'a> {
     pub fn admit(
         &mut self,
         backend: &mut dyn Backend,
+        mut entering: Vec<(usize, Entering)>,
+        queue: &mut Queue,
+        sink: &mut dyn Sink,
+    ) -> Result<Vec<usize>> {
+        // Of few members, each frees the memory in which the next is made.
+        let at_once = if self.roster.threads.share(entering.len()) { entering.len() } else { 1 };
+        let mut over = Vec::new();
+        while !entering.is_empty() {
+            let part = entering.drain(..at_once).collect();
+            over.extend(self.admit_part(backend, part, queue, sink)?);
+        }
+        Ok(over)
+    }
+
+    fn admit_part(
+        &mut self,
+        backend: &mut dyn Backend,
         entering: Vec<(usize, Entering)>,
         queue: &mut Queue,
         sink: &mut dyn Sink,
@@ -70,8 +87,8 @@ impl<'a> Pool<'a> {
                 }
             }
         }
-        backend.load_all(runs, &roster.threads)?;
-        failed.map(|()| over)
+        let loaded = backend.load_all(runs, &roster.threads);
+        failed.and(loaded).map(|()| over)
     }
 
     /// Nodes of a member.
