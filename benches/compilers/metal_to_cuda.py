@@ -1,4 +1,4 @@
-"""Turns a kernel in Metal, as naga writes it in f32, into CUDA for clang: metal_to_cuda.py IN.metal f32|f64 OUT.cu
+"""Turns a kernel in Metal, as naga writes it in f32, into CUDA for clang: metal_to_cuda.py IN.metal OUT.cu
 
 metal_on_cuda.h defines the names of Metal that such a kernel uses.
 """
@@ -6,7 +6,7 @@ metal_on_cuda.h defines the names of Metal that such a kernel uses.
 import re
 import sys
 
-source, precision, out = sys.argv[1:4]
+source, out = sys.argv[1:3]
 text = open(source).read()
 
 # Types and names.
@@ -14,7 +14,6 @@ for gone in ["#include <metal_stdlib>", "#include <simd/simd.h>", "using metal::
     text = text.replace(gone, "")
 text = re.sub(r"^constant (\w+) (\w+) =", r"static constexpr \1 \2 =", text, flags=re.M)
 text = text.replace("constant ", "const ")
-text = re.sub(r"\bfloat\b", "REAL", text)
 for metal, cuda in [
     (r"\bvec_\(", "metal::F4("),
     (r"\bpair\(", "metal::F2("),
@@ -22,7 +21,9 @@ for metal, cuda in [
     (r"(?<!:)\buint2 ", "metal::uint2 "),
     (r"metal::float4\(", "metal::F4("),
     (r"metal::float2\(", "metal::F2("),
-    (r"static_cast<metal::int4>\(", "metal::f2i("),
+    (r"metal::int4\(", "metal::I4("),
+    (r"metal::uint4\(", "metal::U4("),
+    (r"static_cast<(metal::\w+)>\(", r"metal::convert<\1>("),
     (r"\[\[[^\]]*\]\]", ""),
 ]:
     text = re.sub(metal, cuda, text)
@@ -61,11 +62,5 @@ text = text[:start] + entry + "\n".join(local) + body
 function = r"^((?!struct|typedef|static|extern|using|//|#|constant|const)[\w:]+ [\w]+\()"
 text = re.sub(function, r"static inline __attribute__((always_inline)) \1", text, flags=re.M)
 
-numbers = {
-    "f32": ("float", "double", "int", "unsigned", 127, 23, "__nvvm_sqrt_rn_f", "__builtin_floorf"),
-    "f64": ("double", "float", "long", "unsigned long", 1023, 52, "__nvvm_sqrt_rn_d", "__builtin_floor"),
-}[precision]
-names = ["REAL", "FOTHER", "MASK", "UINT", "BIAS", "MANT", "SQRT", "FLOOR"]
-header = "".join(f"#define {name} {value}\n" for name, value in zip(names, numbers))
 with open(out, "w") as file:
-    file.write(header + '#include "metal_on_cuda.h"\n' + text + "\n#pragma clang force_cuda_host_device end\n")
+    file.write('#include "metal_on_cuda.h"\n' + text + "\n#pragma clang force_cuda_host_device end\n")

@@ -539,10 +539,11 @@ class Machine:
         return lambda w, lanes: write(w, lanes, np.broadcast_to(~(normal(a(w)) & normal(b(w))), LANES))
 
     def do_frnd(self, i, o, parts):
-        assert "FLOOR" in parts
+        assert {*parts[1:]} <= {"FLOOR", "F64"}, i.text
+        whole = np.floor if "FLOOR" in parts else np.rint
         if "F64" in parts:
-            return self.map(i, self.put_wide(i, o[0]), np.floor, self.floating(i, o[1], True))
-        return self.map(i, self.put_floating(i, o[0]), np.floor, self.floating(i, o[1]))
+            return self.map(i, self.put_wide(i, o[0]), whole, self.floating(i, o[1], True))
+        return self.map(i, self.put_floating(i, o[0]), whole, self.floating(i, o[1]))
 
     def do_f2i(self, i, o, parts):
         low, high = (0, 2**32 - 1) if "U32" in parts else (-(2**31), 2**31 - 1)
@@ -550,11 +551,10 @@ class Machine:
         return self.map(i, self.put(i, o[0]), whole, self.floating(i, o[1], "F64" in parts))
 
     def do_i2f(self, i, o, parts):
-        assert "U32" in parts
-        read = self.integer(i, o[1])
+        kind, read = np.uint32 if "U32" in parts else np.int32, self.integer(i, o[1])
         if "F64" in parts:
-            return self.map(i, self.put_wide(i, o[0]), np.float64, read)
-        return self.map(i, self.put_floating(i, o[0]), lambda v: np.asarray(v).astype(np.float32), read)
+            return self.map(i, self.put_wide(i, o[0]), lambda v: np.asarray(v).view(kind).astype(np.float64), read)
+        return self.map(i, self.put_floating(i, o[0]), lambda v: np.asarray(v).view(kind).astype(np.float32), read)
 
     do_i2fp = do_i2f
 
