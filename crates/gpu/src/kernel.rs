@@ -266,7 +266,8 @@ impl<T: Real> Backend for Kernel<T> {
         let took = took.unwrap_or_else(|| since.later(self.ended).elapsed());
         self.ended = self.gpu.now();
         if !self.fixed {
-            self.budget = self.budget.after(took, self.solver, self.most);
+            let used_up = self.batches[batch].mirror().has_used_up();
+            self.budget = self.budget.after(took, used_up, self.solver, self.most);
         }
         Ok(())
     }

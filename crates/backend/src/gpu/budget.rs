@@ -45,10 +45,12 @@ impl Budget {
         }
     }
 
-    /// The budget after a dispatch that took `took`: at most twice the sweeps, or steps where there are no sweeps.
-    pub fn after(self, took: Duration, solver: Solver, most: Budget) -> Budget {
+    /// The budget after a dispatch that took `took`: at most twice the sweeps, or steps where there are no sweeps. A
+    /// dispatch that was short because no member used up its budget (`used_up`) says nothing of a larger one.
+    pub fn after(self, took: Duration, used_up: bool, solver: Solver, most: Budget) -> Budget {
         let share = DISPATCH_TIME.as_secs_f64() / took.as_secs_f64().max(1e-6);
-        let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, 2 * now).min(most);
+        let growth = if used_up { 2 } else { 1 };
+        let next = |now: u32, most: u32| ((f64::from(now) * share) as u32).clamp(1, growth * now).min(most);
         match solver.sweeps() {
             true => Budget { sweeps: next(self.sweeps, most.sweeps), ..self },
             false => Budget { steps: next(self.steps, most.steps), ..self },
@@ -69,12 +71,17 @@ mod tests {
                 let time = |b: Budget| Duration::from_nanos(u64::from(nanoseconds_per_unit)) * units(b);
                 let mut budget = Budget::first(solver, most);
                 for _ in 0..30 {
-                    budget = budget.after(time(budget), solver, most);
+                    budget = budget.after(time(budget), true, solver, most);
                 }
                 let settled = (0.5..1.1).contains(&(time(budget).as_secs_f64() / DISPATCH_TIME.as_secs_f64()));
                 let largest = units(budget) == units(most);
                 assert!(settled || largest, "{solver:?} at {nanoseconds_per_unit} ns: {budget:?}");
-                assert_eq!(budget.after(Duration::from_secs(3600), solver, most).steps.min(1), 1);
+                assert_eq!(budget.after(Duration::from_secs(3600), true, solver, most).steps.min(1), 1);
+                assert_eq!(budget.after(Duration::ZERO, false, solver, most), budget);
+                assert!(budget == most || budget.after(Duration::ZERO, true, solver, most) != budget);
+                assert!(
+                    units(budget) == 1 || units(budget.after(2 * DISPATCH_TIME, false, solver, most)) < units(budget)
+                );
             }
         }
     }

@@ -233,6 +233,11 @@ impl<T: Real> Mirror<T> {
         Ok(())
     }
 
+    /// Whether a member that was due has used up its budget: it neither ended nor came to its goal.
+    pub fn has_used_up(&self) -> bool {
+        self.due.iter().any(|slot| self.counters[*slot as usize].is_running())
+    }
+
     /// Members that were not due have made no sweeps.
     pub fn forget_sweeps(&mut self) {
         for counters in &mut self.counters {
