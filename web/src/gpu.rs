@@ -115,7 +115,7 @@ impl WebGpu {
     /// Takes what came back from a dispatch that took `took`.
     pub fn deliver(&mut self, bytes: &[u8], took: Duration) {
         self.back = Some(bytes.to_vec());
-        self.budget = self.budget.after(took, self.solver(), self.most);
+        self.budget = self.budget.after(took, self.mirror.has_used_up(), self.solver(), self.most);
     }
 
     fn solver(&self) -> Solver {
