@@ -174,7 +174,7 @@ fn what_cannot_be_refined_is_refused_with_the_reason() {
             Spec { points: 10, modes: "2..=2".to_string().try_into().unwrap(), ..base.clone() },
             "n/2 = 5 nodes are too few",
         ),
-        (Spec { points: 40, ..base.clone() }, "use 64 or more"),
+        (Spec { points: 40, ..base.clone() }, "(--modes 2..=8: 20 nodes resolve no mode above 5); use 64 or more"),
         (Spec { accuracy: Some(0.0), ..base.clone() }, "--accuracy 0"),
         (Spec { accuracy: Some(-1.0), ..base.clone() }, "--accuracy -1"),
         (Spec { accuracy: Some(1e-300), ..base.clone() }, "use a number from"),

@@ -389,7 +389,10 @@ impl Cell {
         let Err(fault) = runs(&self.spec) else { return Ok(()) };
         let n = self.spec.points;
         let more = (n + 1..=MAX_MORE * n).find(|points| runs(&Spec { points: *points, ..self.spec.clone() }).is_ok());
-        let coarser = format!("n/2 = {} nodes are too few ({fault})", RefinementLevel::HALF.points(n));
+        let why = fault.to_string();
+        // Without its remedy, which is for members of n/2 nodes.
+        let why = why.rsplit_once("; ").map_or(why.as_str(), |(why, _)| why);
+        let coarser = format!("n/2 = {} nodes are too few ({why})", RefinementLevel::HALF.points(n));
         Err(match more {
             Some(points) => Error::value(
                 "points",

@@ -18,7 +18,7 @@ use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
 use curvelax_files::zarr;
 use curvelax_study::placement::{ChosenBackend, Platform};
-use finer::FinerPilot;
+use finer::{FinerPilot, LevelGrowth};
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
 use size::Residents;
 
@@ -166,13 +166,14 @@ impl Estimate {
         let share = finer.share(study).filter(|_| certain < stages.len());
         let finer_members = share.map(|[share, _]| share * members as f64);
         let varied = study.varied_members();
+        let growth = LevelGrowth::of(study.spec());
         // A member of a level of which nothing is known costs what an own one does.
         let sum = |of: fn(&CohortWork) -> Option<f64>| {
             let all = scale * of(&own)?;
             let at_levels = of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work);
             let of_level = at_levels / level_members.max(1) as f64;
-            let more = finer_members.map_or(0.0, |finer| finer::work(finer, of_level));
-            Some(all + at_levels + more + finer::varied_work(varied, share.map_or(0.0, |[share, _]| share), of_level))
+            let more = finer_members.map_or(0.0, |finer| growth.work(finer, of_level));
+            Some(all + at_levels + more + growth.varied_work(varied, share.map_or(0.0, |[share, _]| share), of_level))
         };
         let seconds = sum(|work| work.seconds);
         // If none has ended yet, all may have one.
