@@ -69,6 +69,14 @@ fn solve(both: bool, negligible: real, made: u32, most: u32) -> Solve {
     return Solve(uniform_decision(select(NOT_FINITE, SOLVED, largest.x <= real(BIG))), 0u);
 }
 
+/// How a solution ended does not depend on how much it changed.
+fn judge_round(begun: Course, change: real, negligible: real) -> Course { return begun; }
+
+/// Whether to refine again after `round` solves.
+fn continues(course: Course, round: u32) -> bool {
+    return course.ended == SOLVED && round <= course.refinements;
+}
+
 fn solve_rows() {
     let interior = eliminate_interior();
     let own = solve_ring(pair_row(interior));

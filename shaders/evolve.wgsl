@@ -63,7 +63,7 @@ fn make_plan(found: u32) {
     if ADAPTIVE {
         plan.order = counters.order;
         plan.length = stride().length;
-        if REFINED { plan.refinements = refinements(plan.length, all_reports[member].report.now.length); }
+        if REFINED && !SWEEPS { plan.refinements = refinements(plan.length, all_reports[member].report.now.length); }
         plan.taken = all_reports[member].report.progress.taken;
     }
 }

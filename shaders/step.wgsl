@@ -5,7 +5,9 @@
 const NEGLIGIBLE = 0.1;
 const HALF_OVER_PI = 0.15915494309189535;
 /// Whether solutions are refined.
-const REFINED = IS_SHORT && ADAPTIVE && !SWEEPS;
+const REFINED = IS_SHORT && ADAPTIVE;
+/// Whether they are by rounds of sweeps.
+const IN_ROUNDS = REFINED && SWEEPS;
 
 /// The new curve, with the windows of its nodes.
 var<private> new_k: vec;
@@ -57,41 +59,51 @@ fn step(begun: Course, moves: bool) -> Course {
     var course = begun;
     find_member();
     forget();
-    let length = redistribute(moves);
-    let radius = length * real(HALF_OVER_PI);
-    let rounding = real(NEGLIGIBLE * EPSILON);
+    // Before every round, so that what its equations need takes no registers while it sweeps.
+    var length = real(0.0);
+    if !IN_ROUNDS { length = redistribute(moves); }
 
     var positions = (begun.phase & 1u) != 0u;
     // Without a solve in between, others may still read what was exchanged last.
     if positions {
         settle();
         u = load_field(INCREMENTS);
-    } else {
+    } else if !IN_ROUNDS {
         begin_curvature();
     }
     // The two solves share a call, since compilers inline the body of every call.
     var round = 0u;
     loop {
+        if IN_ROUNDS {
+            settle();
+            length = redistribute(moves);
+        }
         if positions {
             begin_positions(round);
-        } else if round > 0u {
+        } else if IN_ROUNDS || round > 0u {
             curvature_equation();
         }
-        if REFINED && round > 0u { leave_the_rest(positions); }
+        let is_rest = IN_ROUNDS || round > 0u;
+        if REFINED && is_rest { leave_the_rest(positions); }
+        let radius = length * real(HALF_OVER_PI);
+        let rounding = real(NEGLIGIBLE * EPSILON);
         let negligible = select(rounding / radius, rounding * radius, positions);
         let done = solve(positions, negligible, course.solve_sweeps, course.sweeps);
         let made = done.sweeps - course.solve_sweeps;
-        if REFINED {
-            gather(positions, round > 0u);
-            round += 1u;
-            if done.ended == SOLVED && round <= course.refinements { continue; }
-            round = 0u;
-        }
-        if positions { end_positions(made); } else { end_curvature(made); }
+        if SWEEPS { count_sweeps(positions, made); }
         course.sweeps -= min(course.sweeps, made);
         course.ended = done.ended;
         course.solve_sweeps = done.sweeps;
-        if done.ended != SOLVED { return course; }
+        if REFINED {
+            let change = largest();
+            gather(positions, is_rest);
+            course = judge_round(course, change, negligible);
+            round += 1u;
+            if continues(course, round) { continue; }
+            round = 0u;
+        }
+        if positions { end_positions(); } else { end_curvature(); }
+        if course.ended != SOLVED { return course; }
         course.phase += 1u;
         course.solve_sweeps = 0u;
         if positions { break; }
@@ -119,13 +131,18 @@ fn begin_curvature() {
     curvature_equation();
     trace_system(3u);
     trace(8u, rhs_x);
-    if SWEEPS { u = load_field(INCREMENTS); }
+    if SWEEPS && !IN_ROUNDS { u = load_field(INCREMENTS); }
 }
 
-fn end_curvature(made: u32) {
-    if SWEEPS { store_field(INCREMENTS, u); }
-    if lane == 0u { all_counters[member].sweeps_k += made; }
+fn end_curvature() {
+    if SWEEPS && !IN_ROUNDS { store_field(INCREMENTS, u); }
     trace(9u, u);
+}
+
+fn count_sweeps(positions: bool, made: u32) {
+    if lane != 0u { return; }
+    let counters = &all_counters[member];
+    if positions { counters.sweeps_x += made; } else { counters.sweeps_k += made; }
 }
 
 /// Takes what the increments so far give from the right-hand sides.
@@ -164,18 +181,17 @@ fn begin_positions(round: u32) {
     trace_system(10u);
     trace(15u, rhs_x);
     trace(16u, rhs_y);
-    if SWEEPS {
+    if SWEEPS && !IN_ROUNDS {
         u = load_field(INCREMENTS + 1u);
         v = load_field(INCREMENTS + 2u);
     }
 }
 
-fn end_positions(made: u32) {
-    if SWEEPS {
+fn end_positions() {
+    if SWEEPS && !IN_ROUNDS {
         store_field(INCREMENTS + 1u, u);
         store_field(INCREMENTS + 2u, v);
     }
-    if lane == 0u { all_counters[member].sweeps_x += made; }
     trace(17u, u);
     trace(18u, v);
 }

@@ -21,6 +21,9 @@ fn residual(rhs: vec, w: Window) -> vec {
     return rhs - row_of.a * minus2(w) - row_of.b * minus1(w) - row_of.d * plus1(w) - row_of.e * plus2(w) - here(w);
 }
 
+/// The largest of the unknowns of the block.
+fn largest() -> real { return block_max(max(bounded_abs(u), bounded_abs(v))); }
+
 /// How a solve ended.
 const UNSOLVED = 0u;
 const SOLVED = 1u;

@@ -177,11 +177,12 @@ class Keys(TypedDict, total=False):
     it; lexicographic: one after another. By default coloured."""
 
     tolerance: float | bool
-    """Residual tolerance at which Gauss-Seidel sweeps stop. By default 1e-3 in f32, 1e-5 in f64."""
+    """Tolerance at which Gauss-Seidel sweeps stop: of the residual, and of adaptive steps in f32, whose solutions are
+    refined, of the change by a round. By default 1e-3 in f32, 1e-6 where refined, 1e-5 in f64."""
 
     sor: float | Literal["auto"]
     """Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system. By
-    default 1."""
+    default 1; auto with adaptive."""
 
     max_sweeps: int
     """Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled`. By default 200000."""

@@ -50,7 +50,7 @@ by rounding only.
 --work-precision runs members of the default ensemble with fixed steps and with adaptive steps of every order, at
 several lengths and tolerances, until they are relaxed. Its error is the median of |t_relax/reference - 1|, where the
 reference has the same nodes and a tolerance of 1e-8: the error of the steps alone. It takes some seconds with --solver
-direct, and minutes with plain sweeps.
+direct, and minutes with sweeps.
 
 --referee solves the same flow by tangent angle and length, with Fourier coefficients and steps of order 8, twice, until
 both solutions agree to 1e-6. It refuses curves with corners and curves that become singular. For one curve the table has
@@ -120,7 +120,8 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     let mut method = if refereed { checked(spec)? } else { spec.validate()? };
     let choice = placement::choose(&method, method.points)?;
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
-    choice.settle(&mut method);
+    choice.settle_place(&mut method);
+    method.solver = method.solver().into();
     let names = match (args.work_precision, refereed) {
         (true, _) => [names::WORK.into()].into_iter().chain(pictures(on_screen, &prints)).collect(),
         (_, true) => vec![names::REFEREE.into()],

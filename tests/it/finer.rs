@@ -79,9 +79,27 @@ fn limits_in_f32_are_those_in_f64_within_their_errors() {
         .map(|row| (number::<u64>(row, "points") > 400, row["precision"].clone()))
         .collect();
     assert_eq!(numbers, BTreeSet::from([(false, "f32".to_owned()), (true, "f64".to_owned())]));
-    let output = curvelax(home.path(), &format!("{curves} --precision f32 --solver gauss-seidel --out refused"));
+}
+
+#[test]
+fn limits_by_sweeps_in_f32_are_those_of_f64() {
+    let home = TempDir::new().unwrap();
+    let spec = "run --accurate --shape ellipse:1.5,1 --amplitude 0.05 --curves 4 --points 64 --backend cpu";
+    let sweeps = "--precision f32 --solver gauss-seidel";
+    let [single, double] = [sweeps, "--precision f64"].map(|method| {
+        let out = home.path().join(&method[12..15]);
+        done(home.path(), &format!("{spec} {method} --out {}", out.display()));
+        rows(&out.join("summary.csv"))
+    });
+    for (single, double) in single.iter().zip(&double) {
+        let off = number::<f64>(single, "t_limit") - number::<f64>(double, "t_limit");
+        assert!(number::<u64>(single, "sweeps_k") > 0 && off != 0.0, "{single:?}");
+        assert!(off.abs() < number::<f64>(single, "t_error"), "{single:?} {double:?}");
+    }
+    // Sweeps with a factor of their own may leave more than limits can bear.
+    let output = curvelax(home.path(), &format!("{spec} {sweeps} --sor 1 --out refused"));
     let said = String::from_utf8(output.stderr).unwrap();
-    let refused = said.contains("the rounding of solves by sweeps in f32");
+    let refused = said.contains("--sor 1: ") && said.contains("use --sor auto");
     assert!(output.status.code() == Some(2) && refused, "{said}");
 }
 

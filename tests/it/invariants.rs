@@ -251,7 +251,7 @@ fn the_work_of_a_run_is_what_it_was() {
     let spec = |flow: Flow, n, sor| Spec {
         points: n,
         flow: flow.into(),
-        sor: Sor::Factor(sor),
+        sor: Some(Sor::Factor(sor)),
         tau: Some(1e-3.into()),
         t_end: Some(0.1.into()),
         ..method(Precision::F64, Solver::GaussSeidel)
@@ -261,7 +261,7 @@ fn the_work_of_a_run_is_what_it_was() {
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
     let adaptive = Spec { omega: Some(Omega::Rate(1.0)), ..adaptive };
     let swept = Spec { solver: Solver::GaussSeidel.into(), ..adaptive.clone() };
-    let automatic = Spec { sor: Sor::Auto, ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let automatic = Spec { sor: Some(Sor::Auto), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
     let stops =
         Spec { stop_when_relaxed: Some(true), t_end: Some(2.0.into()), ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     let mut changed = Vec::new();

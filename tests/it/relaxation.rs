@@ -378,7 +378,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     // Steps of any length can be solved once they are short enough; the member creeps on until it has made its share.
     println!("{} steps to {}", outcome.steps, outcome.t_end);
     assert!(outcome.steps > 1000 && outcome.t_end < 0.1, "{outcome:?}");
-    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Sor::Factor(1.7), ..spec }).status, Status::Relaxed);
+    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Some(Sor::Factor(1.7)), ..spec }).status, Status::Relaxed);
 }
 
 fn crosses(snapshot: &Snapshot) -> bool {

@@ -23,8 +23,8 @@ use curvelax::{
     },
     solver::{
         Blocks, Solver,
-        gauss_seidel::{AUTO_SCALE, SWEEPS_PER_CHECK},
-        sweeps,
+        gauss_seidel::{AUTO_SCALE, MAX_CHECKS, SWEEPS_PER_CHECK},
+        refinement, sweeps,
     },
 };
 use naga::{
@@ -368,6 +368,8 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("LATE_LOOK", dense::LOOKS[1]),
         ("NEGLIGIBLE", NEGLIGIBLE),
         ("SWEEPS_PER_CHECK", f64::from(SWEEPS_PER_CHECK)),
+        ("MAX_CHECKS", MAX_CHECKS),
+        ("SETTLED", refinement::SETTLED),
         ("AUTO_SCALE", AUTO_SCALE),
         ("FLOOR", sweeps::FLOOR),
         ("NEVER", f64::from(NEVER)),
@@ -404,6 +406,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
     let of_the_kernel = [
         "IS_SHORT",
         "REFINED",
+        "IN_ROUNDS",
         "UNSOLVED",
         "SOLVED",
         "NOT_FINITE",

@@ -262,11 +262,13 @@ impl Precision {
         }
     }
 
-    /// Returns the default tolerance of the sweeps.
-    pub fn tolerance(self) -> f64 {
-        match self {
-            Precision::F32 => 1e-3,
-            Precision::F64 => 1e-5,
+    /// Returns the default tolerance of the sweeps of fixed or adaptive steps. Those of adaptive steps in f32 are
+    /// [refined](crate::solver::refinement).
+    pub fn tolerance(self, adaptive: bool) -> f64 {
+        match (self, adaptive) {
+            (Precision::F32, false) => 1e-3,
+            (Precision::F32, true) => 1e-6,
+            (Precision::F64, _) => 1e-5,
         }
     }
 }

@@ -13,7 +13,7 @@ use curvelax_backend::{
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Spec, Study,
-    request::spec::{BackendChoice, Precision},
+    request::spec::{BackendChoice, Precision, Sor},
     study::Stage,
 };
 use curvelax_flow::{
@@ -232,11 +232,11 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
 
 /// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
 fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
-    // What is measured is the rounding of steps whose solves are refined; levels beside fixed steps are such.
+    // Levels beside fixed steps are solved directly.
     let by_sweeps = spec.adaptive.is_some() && spec.solver().sweeps();
-    if precision == Precision::F32 && spec.refine && by_sweeps {
-        let problem = "the rounding of solves by sweeps in f32 is larger than the errors that it is to tell";
-        return Err(Error::value("refine", true, problem, "use --solver direct, or --precision f64"));
+    if precision == Precision::F32 && spec.refine && by_sweeps && spec.sor() != Sor::Auto {
+        let problem = "rounds of sweeps with it leave more in f32 than the errors that limits are to tell";
+        return Err(Error::value("sor", spec.sor(), problem, "use --sor auto, --solver direct, or --precision f64"));
     }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
@@ -282,6 +282,7 @@ impl ChosenBackend {
         self.settle_place(spec);
         if spec.solver().sweeps() {
             spec.tolerance = Some(spec.tolerance_at(self.precision));
+            spec.sor = Some(spec.sor());
         }
         spec.solver = spec.solver().into();
     }

@@ -9,7 +9,7 @@
 
 use crate::{
     Outcome, Spec, Status, Variation,
-    request::spec::{BackendChoice, FinalTime, Order, Pace, Precision, SolverChoice, Sor, Store},
+    request::spec::{BackendChoice, FinalTime, Order, Pace, Precision, SolverChoice, Store},
     request::validate::tightest_adaptive,
 };
 use curvelax_base::error::Result;
@@ -140,7 +140,7 @@ impl RefinementLevel {
             // ω as it is: it has a part in the error of n.
             spec.omega = Some(of.omega());
             (spec.solver, spec.order) = (SolverChoice::Only(Solver::Direct), Order::Coloured);
-            (spec.tolerance, spec.sor, spec.max_sweeps) = (None, Sor::Factor(1.0), Spec::default().max_sweeps);
+            (spec.tolerance, spec.sor, spec.max_sweeps) = (None, None, Spec::default().max_sweeps);
         }
         let Spec { only, shard, .. } = spec.clone();
         let spec = Spec { only: None, shard: None, ..spec }.validate()?;

@@ -271,12 +271,14 @@ keys! {
         /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU
         /// needs it; lexicographic: one after another [default: coloured]
         order: Order = Order::Coloured, "ORDER", Method;
-        /// Residual tolerance at which Gauss-Seidel sweeps stop [default: 1e-3 in f32, 1e-5 in f64]
+        /// Tolerance at which Gauss-Seidel sweeps stop: of the residual, and of adaptive steps in f32, whose solutions
+        /// are refined, of the change by a round [default: 1e-3 in f32, 1e-6 where refined, 1e-5 in f64]
         #[serde(skip_serializing_if = "Option::is_none")]
         tolerance: Option<f64> = None, "TOL", Method;
         /// Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system
-        /// [default: 1]
-        sor: Sor = Sor::Factor(1.0), "FACTOR", Method;
+        /// [default: 1; auto with --adaptive]
+        #[serde(skip_serializing_if = "Option::is_none")]
+        sor: Option<Sor> = None, "FACTOR", Method;
         /// Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled` [default: 200000]
         max_sweeps: u32 = 200_000, "COUNT", Method;
         /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]

@@ -232,6 +232,15 @@ impl Spec {
         }
     }
 
+    /// The over-relaxation in use: with fixed steps that of the paper.
+    pub fn sor(&self) -> Sor {
+        match (self.sor, self.pace()) {
+            (Some(sor), _) => sor,
+            (None, Pace::Fixed(_)) => Sor::Factor(1.0),
+            (None, Pace::Adaptive(_)) => Sor::Auto,
+        }
+    }
+
     /// Whether the force of the polygon moves the nodes. `auto` is the paper's form: the other one fails where nodes do
     /// not resolve the curve, and intervals of limits were calibrated with this one. For crystals and forced curves
     /// there is no other.
@@ -279,7 +288,7 @@ impl Spec {
 
     /// The residual tolerance in use at `precision`.
     pub fn tolerance_at(&self, precision: Precision) -> f64 {
-        self.tolerance.unwrap_or(precision.tolerance())
+        self.tolerance.unwrap_or(precision.tolerance(matches!(self.pace(), Pace::Adaptive(_))))
     }
 }
 
@@ -322,7 +331,7 @@ mod tests {
             adaptive: Some(1e-3),
             omega: Some(Omega::Auto),
             pull: Pull::Auto,
-            sor: Sor::Auto,
+            sor: Some(Sor::Auto),
             relax_to: Some(0.1),
             ..Spec::default()
         };

@@ -201,7 +201,7 @@ impl Spec {
             let allowed = format!("use a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
             return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
         }
-        if let Sor::Factor(factor) = self.sor
+        if let Some(Sor::Factor(factor)) = self.sor
             && !(factor > 0.0 && factor < 2.0)
         {
             let problem = "sweeps do not converge with this over-relaxation";
@@ -287,10 +287,8 @@ impl Spec {
         let asked = [
             (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
             self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
-            (self.sor != default.sor).then(|| match self.sor {
-                Sor::Factor(factor) => ("sor", number(factor)),
-                Sor::Auto => ("sor", "auto".to_string()),
-            }),
+            // Folders of earlier versions name the paper's factor whatever the solver.
+            self.sor.filter(|sor| *sor != Sor::Factor(1.0)).map(|sor| ("sor", sor.to_string())),
             (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
         ];
         let Facts { refuses, refuses_because: problem, .. } = *self.solver().facts();

@@ -235,7 +235,7 @@ fn parameters(
         },
         geometric: f64::from(u8::from(spec.is_geometric())),
         tolerance,
-        sor: match spec.sor {
+        sor: match spec.sor() {
             Sor::Factor(factor) => factor,
             Sor::Auto => 0.0,
         },

@@ -6,10 +6,7 @@
 //! number of several lanes which branch to take.
 
 use super::{Parameters, law::Kind};
-use crate::{
-    number::{Number, Real},
-    solver::Solves,
-};
+use crate::number::{Number, Real};
 
 /// The branches of one member, or of a group of members that share them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -29,10 +26,9 @@ pub struct Branches {
 }
 
 impl Branches {
-    /// Returns whether solutions are refined: those of adaptive steps in f32 by the direct solver. Fixed steps are off
-    /// by more, and sweeps stop at their tolerance.
-    pub fn is_refined<N: Number, S: Solves>(&self) -> bool {
-        N::IS_SHORT && self.adaptive && !S::FACTS.sweeps
+    /// Returns whether solutions are refined: those of adaptive steps in f32. Fixed steps are off by more.
+    pub fn is_refined<N: Number>(&self) -> bool {
+        N::IS_SHORT && self.adaptive
     }
 }
 

@@ -317,7 +317,7 @@ impl<N: Number> Team<N> {
                     length,
                     N::Real::of(n as f64),
                     &run.parameters,
-                    branches.is_refined::<N, S>(),
+                    branches.is_refined::<N>(),
                 ),
                 order: most_order.min(extrapolation::most_order(N::Real::EPSILON)),
             });

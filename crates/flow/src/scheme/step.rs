@@ -103,7 +103,7 @@ pub fn step_by<N: Number, S: Solves>(
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
     let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, .. } = work;
-    let refined = branches.is_refined::<N, S>();
+    let refined = branches.is_refined::<N>();
     // Not compiled for members side by side, which nobody traces.
     let traced = N::LANES == 1 && work.traced;
     let refinements = if refined { work.refinements } else { N::of(0.0) };
@@ -117,6 +117,7 @@ pub fn step_by<N: Number, S: Solves>(
         sor: p.sor,
         max_sweeps: method.max_sweeps,
         order: method.order,
+        refined,
         refinements,
     };
 

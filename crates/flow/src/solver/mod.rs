@@ -126,6 +126,19 @@ pub trait Solves: 'static {
         control: &Control<N>,
         live: N::Mask,
     ) -> Swept<N>;
+
+    /// Solves `system` for `lacks`, whose values do not matter, as well as one round of a
+    /// [refinement](refinement::solve) does: rounds before it have made `made` sweeps. Converged are the lanes that may
+    /// continue.
+    fn round<N: Number, const F: usize>(
+        system: &impl Equations<N, F>,
+        lacks: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        made: N,
+        live: N::Mask,
+    ) -> Swept<N>;
 }
 
 /// The name, needs and properties of a solver.
@@ -211,6 +224,20 @@ impl Solves for Sweeps {
         memory.system.assemble(system);
         gauss_seidel::solve(&memory.system, unknown, blocks, control, live)
     }
+
+    #[inline(always)]
+    fn round<N: Number, const F: usize>(
+        system: &impl Equations<N, F>,
+        lacks: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        made: N,
+        live: N::Mask,
+    ) -> Swept<N> {
+        memory.system.assemble(system);
+        gauss_seidel::sweep_round(&memory.system, lacks, blocks, control, made, live)
+    }
 }
 
 /// [`Solver::Direct`] as a type.
@@ -242,5 +269,18 @@ impl Solves for Elimination {
     ) -> Swept<N> {
         let finite = direct::solve(system, unknown, &mut memory.factor);
         Swept { sweeps: N::of(0.0), converged: finite, finite }
+    }
+
+    #[inline(always)]
+    fn round<N: Number, const F: usize>(
+        system: &impl Equations<N, F>,
+        lacks: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        blocks: Blocks,
+        control: &Control<N>,
+        _: N,
+        live: N::Mask,
+    ) -> Swept<N> {
+        Self::solve(system, lacks, memory, blocks, control, live)
     }
 }

@@ -2,13 +2,18 @@
 //!
 //! A solve in f32 is off by some `16τ/h⁴·ε` of itself, most of it in the slowest modes, which the residual hardly shows
 //! unless it is computed by differences of differences ([`Equations::applied`]). What it leaves is solved for by the
-//! same matrix, and added.
+//! same matrix, and added. A direct solver does so as often as it is told. Sweeps continue by rounds until one changes
+//! the solution by no more than their tolerance, or than its rounding.
 
 use super::{
     Blocks, Equation, Equations, Memory, Ring, Solves,
-    sweeps::{Control, Swept},
+    sweeps::{self, Control, Swept},
 };
-use crate::number::{Mask, Number};
+use crate::number::{BIG, Mask, Number};
+
+/// Change of a solution by a round of sweeps, in units of ε, up to which it is rounding. At 2 rounds without end were
+/// seen.
+pub const SETTLED: f64 = 8.0;
 
 /// What a solution leaves of the right-hand sides, and what it lacks.
 #[derive(Clone, Debug)]
@@ -47,10 +52,10 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     }
 }
 
-/// Solves `equations`, and in short numbers refines the solution of a direct solver as often as `control` says.
+/// Solves `equations`, and refines the solution if `control` says so.
 ///
-/// The first solve is one for what zero lacks, so that the body of a solve is compiled once: it takes most of the time
-/// of the compiler.
+/// The first solve of a direct solver is one for what zero lacks, so that its body is compiled once: it takes most of
+/// the time of the compiler. Sweeps start from `unknown`.
 #[inline(always)]
 pub fn solve<N: Number, S: Solves, const F: usize>(
     equations: &impl Equations<N, F>,
@@ -61,14 +66,14 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
     control: &Control<N>,
     mut live: N::Mask,
 ) -> Swept<N> {
-    if !N::IS_SHORT || S::FACTS.sweeps {
+    if !N::IS_SHORT || (S::FACTS.sweeps && !control.refined) {
         return S::solve(equations, unknown, memory, blocks, control, live);
     }
     let Remainder { left, lacks } = remainder;
     let mut all = Swept { sweeps: N::of(0.0), converged: live, finite: live };
     let mut made = 0;
     loop {
-        let first = made == 0;
+        let first = made == 0 && !S::FACTS.sweeps;
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
             for f in 0..F {
@@ -76,7 +81,8 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
             }
         }
         let remaining = Remaining { of: equations, left };
-        let swept = S::solve(&remaining, lacks.each_mut(), memory, blocks, control, live);
+        let swept = S::round(&remaining, lacks.each_mut(), memory, blocks, control, all.sweeps, live);
+        all.sweeps += swept.sweeps;
         all.converged = all.converged.and(swept.converged.or(live.not()));
         all.finite = all.finite.and(swept.finite.or(live.not()));
         for f in 0..F {
@@ -86,10 +92,28 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
             }
             unknown[f].close();
         }
-        live = live.and(all.converged).and(control.refinements.le(N::of(f64::from(made))).not());
+        live = live.and(all.converged);
+        if S::FACTS.sweeps {
+            let [change, size] = [sweeps::largest(&lacks.each_mut()), sweeps::largest(&unknown)];
+            let (solved, unsolved) = judge_round(change, size, control);
+            let over = N::of(f64::from(control.max_sweeps)).le(all.sweeps);
+            all.converged = all.converged.and(live.not().or(solved).or(unsolved.and(over.not())));
+            live = live.and(unsolved).and(over.not());
+        } else {
+            live = live.and(control.refinements.le(N::of(f64::from(made))).not());
+        }
         if !live.any() {
             return all;
         }
         made += 1;
     }
+}
+
+/// Judges a round of sweeps by the largest change that it made to the unknown, and the largest of that: whether it is
+/// solved, and whether more rounds may do so. A round leaves less than half of what there was, so less than its change.
+#[inline(always)]
+fn judge_round<N: Number>(change: N, size: N, control: &Control<N>) -> (N::Mask, N::Mask) {
+    let tolerance = control.tolerance.max(N::of(SETTLED * N::EPSILON));
+    let solved = change.le((tolerance * size).max(control.negligible));
+    (solved, change.le(N::of(BIG)).and(solved.not()))
 }

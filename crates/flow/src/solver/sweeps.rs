@@ -34,7 +34,9 @@ pub struct Control<N> {
     pub max_sweeps: u32,
     /// Order of a sweep.
     pub order: Order,
-    /// How often a solution is [refined](super::refinement), per lane.
+    /// Whether solutions are [refined](super::refinement), in short numbers.
+    pub refined: bool,
+    /// How often one by a direct solver is, per lane.
     pub refinements: N,
 }
 
@@ -107,6 +109,18 @@ pub(super) fn norms<N: Number, const F: usize>(system: &System<N, F>, unknown: &
         }
     }
     norms
+}
+
+/// `max |u|` over nodes and unknowns.
+#[inline(always)]
+pub(super) fn largest<N: Number, const F: usize>(unknown: &[&mut Ring<N>; F]) -> N {
+    let mut largest = N::of(0.0);
+    for u in unknown {
+        for i in 0..u.len() {
+            largest = largest.max(u[i].bounded_abs());
+        }
+    }
+    largest
 }
 
 /// Sweeps once, colour by colour.

@@ -144,7 +144,7 @@ impl WorkPrecision {
     /// What was measured, in a sentence.
     pub fn sentence(&self) -> String {
         format!(
-            "{} perturbed 2:1 ellipses ({} with plain sweeps), n = {}, {}. Median error against the same nodes at a tolerance of \
+            "{} perturbed 2:1 ellipses ({} with sweeps), n = {}, {}. Median error against the same nodes at a tolerance of \
              {FINEST:e}, median time of several runs.",
             FULL.members,
             SWEPT.members,
@@ -212,7 +212,6 @@ impl WorkPrecision {
         let spec = Spec {
             curves: Effort::of(solver).members,
             solver: solver.into(),
-            tolerance: None,
             omega: Some(Omega::Auto),
             pull: Pull::Auto,
             t_end: Some(FinalTime::Auto),
