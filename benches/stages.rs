@@ -71,6 +71,7 @@ fn stages<T: Evolves>(c: &mut Criterion) {
         sor: p.sor,
         max_sweeps: gauss_seidel::SWEEPS_PER_CHECK,
         order: Order::Coloured,
+        refined: false,
         refinements: T::of(0.0),
     };
     let sweeps = gauss_seidel::SWEEPS_PER_CHECK;

@@ -7,8 +7,8 @@
 // last bit.
 
 /// What thread 0 found of an attempt, and the next one that it plans: the order of an adaptive step, the systems that
-/// are solved, the sweeps made for the next one, how often solutions are refined, the length of the step and that of
-/// the last one.
+/// are solved, the sweeps made for the next one, how often direct solutions are refined, the length of the step and
+/// that of the last one.
 struct Plan { found: u32, order: u32, phase: u32, solve_sweeps: u32, refinements: u32, length: real, taken: real }
 
 var<workgroup> plan: Plan;

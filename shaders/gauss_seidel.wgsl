@@ -1,5 +1,5 @@
-// Coloured Gauss–Seidel sweeps to a residual. Twin of crates/flow/src/solver/gauss_seidel.rs; the sweeps are in
-// sweeps.wgsl.
+// Coloured Gauss–Seidel sweeps to a residual, and those of a round. Twin of
+// crates/flow/src/solver/gauss_seidel.rs; the sweeps are in sweeps.wgsl.
 
 const SWEEPS_PER_CHECK = 8u;
 
@@ -73,13 +73,14 @@ fn sweep_round(both: bool, made: u32) -> Solve {
     sor = select(p.sor, over_relaxation(size), p.sor <= real(0.0));
     let count = uniform_decision(select(0u, sweeps_of_round(size), size <= real(BIG)));
     if count == 0u { return Solve(NOT_FINITE, made); }
-    let sweeps = min(count, dispatch.max_sweeps - made);
+    // Part of a round would tell nothing.
+    if count > dispatch.max_sweeps - made { return Solve(DIVERGED, made); }
     if both {
-        for (var s = 0u; s < sweeps; s++) { sweep_two(); }
+        for (var s = 0u; s < count; s++) { sweep_two(); }
     } else {
-        for (var s = 0u; s < sweeps; s++) { sweep_one(); }
+        for (var s = 0u; s < count; s++) { sweep_one(); }
     }
-    return Solve(UNSOLVED, made + sweeps);
+    return Solve(UNSOLVED, made + count);
 }
 
 /// The sweeps of a round, which with the over-relaxation of its size leaves less than half of what the unknown lacks.
@@ -88,7 +89,7 @@ fn sweeps_of_round(size: real) -> u32 {
 }
 
 /// The most sweeps of a round, in units of SWEEPS_PER_CHECK.
-const MAX_CHECKS = 2048.0;
+const MAX_CHECKS = 1024.0;
 
 /// Change of a solution by a round, in units of EPSILON, up to which it is rounding.
 const SETTLED = 8.0;
@@ -99,13 +100,12 @@ fn judge_round(begun: Course, change: real, negligible: real) -> Course {
     if course.ended != UNSOLVED { return course; }
     let tolerance = max(all_parameters[member].tolerance, real(SETTLED * EPSILON));
     course.ended = judge(change, largest(), tolerance, negligible);
-    if continues(course, 0u) && course.sweeps == 0u { course.ended = PAUSED; }
     return course;
 }
 
 /// Whether another round is due.
 fn continues(course: Course, round: u32) -> bool {
-    return course.ended == UNSOLVED && course.solve_sweeps < dispatch.max_sweeps;
+    return course.ended == UNSOLVED;
 }
 
 /// The over-relaxation that needs about the fewest sweeps for a system of this size.

@@ -17,7 +17,7 @@ var<private> new_y: Window;
 
 /// What is left to do, the same in every thread: how the last solve ended, the systems that the attempt has solved, the
 /// sweeps made for the next one, the steps of the paper and the sweeps that this dispatch may still make, and how often
-/// solutions are refined.
+/// direct solutions are refined.
 struct Course { ended: u32, phase: u32, solve_sweeps: u32, steps: u32, sweeps: u32, refinements: u32 }
 
 /// Forgets what the last step and the last attempt have left in private variables: compilers do not see that nothing
@@ -59,14 +59,13 @@ fn step(begun: Course, moves: bool) -> Course {
     var course = begun;
     find_member();
     forget();
-    // Before every round, so that what its equations need takes no registers while it sweeps.
     var length = real(0.0);
     if !IN_ROUNDS { length = redistribute(moves); }
 
     var positions = (begun.phase & 1u) != 0u;
     // Without a solve in between, others may still read what was exchanged last.
     if positions {
-        settle();
+        if !IN_ROUNDS { settle(); }
         u = load_field(INCREMENTS);
     } else if !IN_ROUNDS {
         begin_curvature();
@@ -75,7 +74,12 @@ fn step(begun: Course, moves: bool) -> Course {
     var round = 0u;
     loop {
         if IN_ROUNDS {
-            settle();
+            if course.sweeps == 0u {
+                course.ended = PAUSED;
+                return course;
+            }
+            // Before every round, so that what its equations need takes no registers while it sweeps.
+            multiplier = real(0.0);
             length = redistribute(moves);
         }
         if positions {
@@ -171,7 +175,7 @@ fn begin_positions(round: u32) {
     find_member();
     if round == 0u { new_k = advanced(2u, load_field(curve + 2u), u); }
     // Others may still read what the last round exchanged.
-    if round > 0u { settle(); }
+    if IN_ROUNDS || round > 0u { settle(); }
     // Lengths are exchanged again, so that their windows take no registers in the first solve.
     let exchanged = windows(new_k, here(r_new));
     k_window = exchanged.a;

@@ -177,8 +177,8 @@ class Keys(TypedDict, total=False):
     it; lexicographic: one after another. By default coloured."""
 
     tolerance: float | bool
-    """Tolerance at which Gauss-Seidel sweeps stop: of the residual, and of adaptive steps in f32, whose solutions are
-    refined, of the change by a round. By default 1e-3 in f32, 1e-6 where refined, 1e-5 in f64."""
+    """Tolerance at which Gauss-Seidel sweeps stop: it bounds the residual, or in adaptive steps in f32 the change by
+    a round of sweeps. By default 1e-5 in f64; in f32 1e-3, with adaptive 1e-6."""
 
     sor: float | Literal["auto"]
     """Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system. By

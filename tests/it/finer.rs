@@ -96,11 +96,13 @@ fn limits_by_sweeps_in_f32_are_those_of_f64() {
         assert!(number::<u64>(single, "sweeps_k") > 0 && off != 0.0, "{single:?}");
         assert!(off.abs() < number::<f64>(single, "t_error"), "{single:?} {double:?}");
     }
-    // Sweeps with a factor of their own may leave more than limits can bear.
-    let output = curvelax(home.path(), &format!("{spec} {sweeps} --sor 1 --out refused"));
-    let said = String::from_utf8(output.stderr).unwrap();
-    let refused = said.contains("--sor 1: ") && said.contains("use --sor auto");
-    assert!(output.status.code() == Some(2) && refused, "{said}");
+    // Sweeps with a factor of their own, or to a larger tolerance, may leave more than limits can bear.
+    for (more, remedy) in [("--sor 1", "use --sor auto"), ("--tolerance 1e-5", "use 1e-6 or less")] {
+        let output = curvelax(home.path(), &format!("{spec} {sweeps} {more} --out refused"));
+        let said = String::from_utf8(output.stderr).unwrap();
+        let refused = said.contains(&format!("{more}: ")) && said.contains(remedy);
+        assert!(output.status.code() == Some(2) && refused, "{said}");
+    }
 }
 
 #[test]

@@ -234,9 +234,22 @@ fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> 
 fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
     // Levels beside fixed steps are solved directly.
     let by_sweeps = spec.adaptive.is_some() && spec.solver().sweeps();
-    if precision == Precision::F32 && spec.refine && by_sweeps && spec.sor() != Sor::Auto {
-        let problem = "rounds of sweeps with it leave more in f32 than the errors that limits are to tell";
-        return Err(Error::value("sor", spec.sor(), problem, "use --sor auto, --solver direct, or --precision f64"));
+    if precision == Precision::F32 && spec.refine && by_sweeps {
+        let problem = "in f32 sweeps leave larger errors with it than --refine is to find";
+        let tightest = precision.tolerance(true);
+        let [tolerance, other] = [spec.tolerance_at(precision), tightest].map(|tolerance| format!("{tolerance:e}"));
+        if spec.sor() != Sor::Auto {
+            return Err(Error::value(
+                "sor",
+                spec.sor(),
+                problem,
+                "use --sor auto, --solver direct, or --precision f64",
+            ));
+        }
+        if spec.tolerance_at(precision) > tightest {
+            let allowed = format!("use {other} or less, --solver direct, or --precision f64");
+            return Err(Error::value("tolerance", tolerance, problem, &allowed));
+        }
     }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");

@@ -1,10 +1,10 @@
 //! Kernels with other forces: the geometric form, crystals, driving forces and what is kept.
 
 use curvelax::{
-    backend::gpu::{Gpu, Kernel, Variant},
+    backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
-        ConformanceRow, Driven,
-        compare::{MAX_SWEEPS, MEMBERS},
+        ConformanceRow, Driven, adaptive_members,
+        compare::{MAX_SWEEPS, MEMBERS, on_gpu},
         driven, self_test, stages_of,
     },
     ensemble::request::spec::Precision,
@@ -14,7 +14,7 @@ use curvelax::{
     solver::{Blocks, Solver},
 };
 
-use super::{Outcome, check, dispatches_of};
+use super::{Outcome, check, dispatches_of, same};
 
 /// After fixed and adaptive steps, by the bounds of the paper's form; which is another one.
 pub(super) fn geometric_agrees<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
@@ -66,6 +66,23 @@ pub(super) fn forced_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> O
 
 pub(super) fn forced_crystals_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     driven_agree::<T>([Driven::ForcedCrystals, Driven::Paper], gpu, solver, n)
+}
+
+/// Where a dispatch ends or pauses changes no bit of members of which something is kept.
+pub(super) fn forced_bits<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
+    let mut launches = adaptive_members(n, MEMBERS, 2, 1e-3, T::PRECISION)?;
+    Driven::Forced.change(&mut launches);
+    let at_once = on_gpu::<T>(gpu, solver, n, &launches, dispatches_of(1000))?;
+    for budget in [dispatches_of(1), Budget { steps: 1000, sweeps: 24 }] {
+        let in_parts = on_gpu::<T>(gpu, solver, n, &launches, budget)?;
+        for (j, (part, whole)) in in_parts.iter().zip(&at_once).enumerate() {
+            if whole.counters.steps < 2 || whole.counters.status != 0 {
+                return Err(format!("member {j}: {:?}", whole.counters).into());
+            }
+            same(part, whole, &format!("member {j} with {budget:?}"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Each number of a force and of what is kept is in the comparison: with another one on the GPU, it fails.

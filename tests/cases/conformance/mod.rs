@@ -32,7 +32,8 @@ use curvelax::{
     solver::{Blocks, Solver},
 };
 use forces::{
-    another_crystal_fails, another_force_fails, crystals_agree, forced_agree, forced_crystals_agree, geometric_agrees,
+    another_crystal_fails, another_force_fails, crystals_agree, forced_agree, forced_bits, forced_crystals_agree,
+    geometric_agrees,
 };
 use glam::DVec2;
 use libtest_mimic::{Failed, Trial};
@@ -141,6 +142,11 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         add(
             "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
             adaptive_bits::<T>,
+            31,
+        );
+        add(
+            "adaptive: where a dispatch ends changes no bit of driven and constrained curves".into(),
+            forced_bits::<T>,
             31,
         );
         if everything() {

@@ -14,7 +14,7 @@ const DISPATCH_TIME: Duration = Duration::from_millis(40);
 pub struct Budget {
     /// Steps of the paper per member.
     pub steps: u32,
-    /// Sweeps per member, rounded up to the next check of the residual.
+    /// Sweeps per member, rounded up to the next check of the residual, or to the end of a round.
     pub sweeps: u32,
 }
 
@@ -23,7 +23,7 @@ const SOFTWARE_ITERATIONS: u32 = 50_000;
 
 impl Budget {
     /// The maximum budget of a dispatch, on hardware or on a software GPU.
-    pub fn most(hardware: bool, blocks: Blocks, Variant { adaptive, .. }: Variant) -> Budget {
+    pub fn most(hardware: bool, blocks: Blocks, Variant { solver, adaptive, .. }: Variant) -> Budget {
         if hardware {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
@@ -31,9 +31,11 @@ impl Budget {
         // and the end of an adaptive one, which may come after any of its parts, as often again.
         let walk = blocks.count() as u32 + 1;
         let walks = if adaptive { 20 } else { 10 };
+        // Before a round, which may be as short, what its equations need is computed anew. The last one may be long.
+        let check = if adaptive && solver.sweeps() { 8 * walk } else { walk };
         Budget {
             steps: (SOFTWARE_ITERATIONS / 2 / (walks * walk)).max(1),
-            sweeps: (SOFTWARE_ITERATIONS / 2 / (SWEEPS_PER_CHECK + walk) * SWEEPS_PER_CHECK).max(SWEEPS_PER_CHECK),
+            sweeps: (SOFTWARE_ITERATIONS / 2 / (SWEEPS_PER_CHECK + check) * SWEEPS_PER_CHECK).max(SWEEPS_PER_CHECK),
         }
     }
 

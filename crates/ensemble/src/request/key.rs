@@ -271,8 +271,8 @@ keys! {
         /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU
         /// needs it; lexicographic: one after another [default: coloured]
         order: Order = Order::Coloured, "ORDER", Method;
-        /// Tolerance at which Gauss-Seidel sweeps stop: of the residual, and of adaptive steps in f32, whose solutions
-        /// are refined, of the change by a round [default: 1e-3 in f32, 1e-6 where refined, 1e-5 in f64]
+        /// Tolerance at which Gauss-Seidel sweeps stop: it bounds the residual, or in adaptive steps in f32 the change
+        /// by a round of sweeps [default: 1e-5 in f64; in f32 1e-3, with --adaptive 1e-6]
         #[serde(skip_serializing_if = "Option::is_none")]
         tolerance: Option<f64> = None, "TOL", Method;
         /// Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system

@@ -127,9 +127,8 @@ pub trait Solves: 'static {
         live: N::Mask,
     ) -> Swept<N>;
 
-    /// Solves `system` for `lacks`, whose values do not matter, as well as one round of a
-    /// [refinement](refinement::solve) does: rounds before it have made `made` sweeps. Converged are the lanes that may
-    /// continue.
+    /// Makes one round of a [refinement](refinement::solve), which solves `system` for `lacks`, whose values do not
+    /// matter; rounds before it have made `made` sweeps. Converged are the lanes that may continue.
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
         lacks: [&mut Ring<N>; F],

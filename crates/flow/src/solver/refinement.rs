@@ -96,9 +96,8 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
         if S::FACTS.sweeps {
             let [change, size] = [sweeps::largest(&lacks.each_mut()), sweeps::largest(&unknown)];
             let (solved, unsolved) = judge_round(change, size, control);
-            let over = N::of(f64::from(control.max_sweeps)).le(all.sweeps);
-            all.converged = all.converged.and(live.not().or(solved).or(unsolved.and(over.not())));
-            live = live.and(unsolved).and(over.not());
+            all.converged = all.converged.and(live.not().or(solved).or(unsolved));
+            live = live.and(unsolved);
         } else {
             live = live.and(control.refinements.le(N::of(f64::from(made))).not());
         }

@@ -45,7 +45,7 @@ pub struct Control<N> {
 pub struct Swept<N: Number> {
     /// Sweeps made, per lane.
     pub sweeps: N,
-    /// Whether the residual reached its bound; false after the cap, or if the sweeps diverged.
+    /// Whether the residual reached its bound, or a round was made; false after the cap, or if the sweeps diverged.
     pub converged: N::Mask,
     /// Whether the system itself was finite; a system that is not is not swept.
     pub finite: N::Mask,
