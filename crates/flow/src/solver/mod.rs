@@ -129,15 +129,18 @@ pub trait Solves: 'static {
 
     /// Makes one round of a [refinement](refinement::solve), which solves `system` for `lacks`, whose values do not
     /// matter; rounds before it have made `made` sweeps. Converged are the lanes that may continue.
+    #[inline(always)]
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         blocks: Blocks,
         control: &Control<N>,
-        made: N,
+        _made: N,
         live: N::Mask,
-    ) -> Swept<N>;
+    ) -> Swept<N> {
+        Self::solve(system, lacks, memory, blocks, control, live)
+    }
 }
 
 /// The name, needs and properties of a solver.
@@ -268,18 +271,5 @@ impl Solves for Elimination {
     ) -> Swept<N> {
         let finite = direct::solve(system, unknown, &mut memory.factor);
         Swept { sweeps: N::of(0.0), converged: finite, finite }
-    }
-
-    #[inline(always)]
-    fn round<N: Number, const F: usize>(
-        system: &impl Equations<N, F>,
-        lacks: [&mut Ring<N>; F],
-        memory: &mut Memory<N, F>,
-        blocks: Blocks,
-        control: &Control<N>,
-        _: N,
-        live: N::Mask,
-    ) -> Swept<N> {
-        Self::solve(system, lacks, memory, blocks, control, live)
     }
 }
