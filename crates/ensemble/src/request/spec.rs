@@ -401,6 +401,7 @@ mod tests {
             "relax-to",
             "relax-at",
             "tolerance",
+            "sor",
             "adapter",
             "precision",
             "series",
