@@ -138,7 +138,6 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         for n in sizes(&FEW_ADAPTIVE_SIZES, &[101]) {
             add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
         }
-        add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 101);
         add("a moved node fails the comparison after adaptive steps".into(), a_moved_node_fails_adaptive::<T>, 101);
         add(
             "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
@@ -159,6 +158,7 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         }
         add("adaptive: members that end badly leave the others untouched".into(), adaptive_bad_members::<T>, 101);
         add("adaptive: the program writes the same tables on both back ends".into(), adaptive_programs_agree::<T>, 101);
+        add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 101);
         for n in [7, 101] {
             add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
         }
