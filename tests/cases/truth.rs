@@ -1,5 +1,5 @@
-//! The scheme against exact solutions: every problem of the table on every back end, in both precisions, by both
-//! solvers. Each comparison has a negative control: the result of a known mistake fails the same bound.
+//! The scheme against exact solutions: every problem of the table on the CPU in both precisions by both solvers, and on
+//! the GPU. Each comparison has a negative control: the result of a known mistake fails the same bound.
 //!
 //! A missed bound means an error, not that the bound is too tight. Without an adapter, GPU cases fail, unless
 //! `ALLOW_NO_GPU=1`: then they are reported as ignored.
@@ -39,9 +39,13 @@ pub fn trials() -> Vec<Trial> {
             if on_gpu && precision == Precision::F64 && gpu.as_ref().is_some_and(|gpu| !gpu.has_f64()) {
                 continue;
             }
-            // Conformance compares the other kernels with the CPU.
+            // On a GPU each solver and each precision once: conformance compares all kernels with the CPU.
             let precise = gpu.as_ref().is_none_or(|gpu| gpu.capacity().best_precision() == precision);
-            let is_wanted = |solver| !on_gpu || everything() || (precise && solver == Solver::Direct);
+            let is_wanted = |solver: Solver| match solver.sweeps() {
+                _ if !on_gpu => true,
+                true => everything() && precision == Precision::F32,
+                false => precise,
+            };
             for solver in Solver::ALL.into_iter().filter(|solver| is_wanted(*solver)) {
                 let method = Spec { backend, precision: Some(precision), solver: solver.into(), ..Spec::default() };
                 for problem in problems() {
