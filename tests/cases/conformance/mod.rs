@@ -44,7 +44,7 @@ use programs::{
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
 /// blocks of three), and one beyond 64 threads. Each has kernels of its own, whose compiler takes most of the time, so
 /// `tests/run` has three of them, and `tests/run --all` has all.
-const SIZES: [usize; 8] = [6, 7, 64, 99, 100, 101, 102, 257];
+const SIZES: [usize; 6] = [6, 7, 64, 99, 101, 257];
 const FEW_SIZES: [usize; 3] = [7, 64, 101];
 
 /// Sizes of the adaptive comparison, whose kernels take the longest to compile. Those of other forms and forces, and of
@@ -56,7 +56,7 @@ const ONE_ADAPTIVE_SIZE: [usize; 1] = [101];
 
 /// Sizes at which the exchange by shuffles is compared with that by barriers: every number of blocks of three, and the
 /// largest ring for eight threads; of adaptive steps at few of them.
-const ONE_SUBGROUP: [usize; 6] = [6, 7, 28, 29, 30, 32];
+const ONE_SUBGROUP: [usize; 4] = [6, 7, 29, 32];
 const FEW_ONE_SUBGROUP: [usize; 2] = [7, 32];
 
 /// All of them, or those of a test that is to be quick.
