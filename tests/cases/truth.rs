@@ -41,11 +41,8 @@ pub fn trials() -> Vec<Trial> {
             }
             // On a GPU each solver and each precision once: conformance compares all kernels with the CPU.
             let precise = gpu.as_ref().is_none_or(|gpu| gpu.capacity().best_precision() == precision);
-            let is_wanted = |solver: Solver| match solver.sweeps() {
-                _ if !on_gpu => true,
-                true => everything() && precision == Precision::F32,
-                false => precise,
-            };
+            let by_sweeps = everything() && precision == Precision::F32;
+            let is_wanted = |solver: Solver| !on_gpu || if solver.sweeps() { by_sweeps } else { precise };
             for solver in Solver::ALL.into_iter().filter(|solver| is_wanted(*solver)) {
                 let method = Spec { backend, precision: Some(precision), solver: solver.into(), ..Spec::default() };
                 for problem in problems() {
