@@ -58,7 +58,7 @@ pub(crate) fn write_all(points: usize, out: &Path) -> Outcome<usize> {
     let blocks = Blocks::new(points).ok_or(TOO_FEW)?;
     fs::create_dir_all(out)?;
     let fits = |variant: &Variant| !variant.subgroup || blocks.count() <= SUBGROUP as usize;
-    let constants = shader::constants(blocks, SUBGROUP);
+    let constants = shader::constants(shader::sizes(blocks, SUBGROUP, true));
     let constants: Constants = constants.iter().map(|(name, value)| (name.to_string(), *value)).collect();
     let mut written = BTreeMap::new();
     for variant in Variant::all().into_iter().filter(|variant| !variant.traced).filter(fits) {

@@ -10,11 +10,11 @@
 /// 2x2 matrices are stored as (m00, m01, m10, m11), pairs for x and y together as (x0, x1, y0, y1).
 /// The interiors of the blocks, with `partials`. They have their own arrays, so that nobody waits for the readers of
 /// what was exchanged before the solve.
-var<workgroup> interior_p: array<vec, BLOCKS>;
-var<workgroup> interior_s: array<vec, BLOCKS>;
+var<workgroup> interior_p: array<vec, ROWS>;
+var<workgroup> interior_s: array<vec, ROWS>;
 /// The right-hand sides of the rows of pairs that have left the ring, next to their coefficients in `ring_a` and
 /// `ring_b`, all divided by their own matrix; in the end all pairs.
-var<workgroup> ring_rhs: array<vec, BLOCKS>;
+var<workgroup> ring_rhs: array<vec, ROWS>;
 
 /// The largest increment of k in the block.
 var<private> largest_k: real;

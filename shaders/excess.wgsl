@@ -42,16 +42,16 @@ var<private> regular: Regular;
 fn regular_near(x: vec, y: vec) -> Regular {
     let unit = root();
     let turned_back = vec(block_sum(x * unit.x + y * unit.y), block_sum(y * unit.x - x * unit.y), 0.0, 0.0);
-    let all = ring_sums(vec(block_sum(x), block_sum(y), turned_back.xy)) / real(NODES);
+    let all = ring_sums(vec(block_sum(x), block_sum(y), turned_back.xy)) / real(node_count());
     let size = sqrt(all.z * all.z + all.w * all.w);
     var along = vec2<real>(1.0, 0.0);
     if !(size <= real(0.0)) { along = all.zw / size; }
-    let cosine = real(HALF_COSINE);
-    let sine = real(HALF_SINE);
+    let cosine = real(dispatch.half_cosine);
+    let sine = real(dispatch.half_sine);
     let tangent = vec2(along.x * sine - along.y * cosine, along.x * cosine + along.y * sine);
     var share = (sine * cosine) * (size * size);
     if CRYSTAL { share = real(0.5) * all_parameters[member].law[AT_REST + 1u]; }
-    return Regular(all.xy, all.zw, tangent, (sine + sine) * size, real(NODES) * share);
+    return Regular(all.xy, all.zw, tangent, (sine + sine) * size, real(node_count()) * share);
 }
 
 /// L', L'', 2A' and 2A'' in units of a length that grows as the polygon would.
@@ -70,7 +70,7 @@ fn regular_changes() -> vec {
     let outwards = vec(
         block_sum(slope_x * nodes.x + slope_y * nodes.y), block_sum(bend_x * nodes.x + bend_y * nodes.y), 0.0, 0.0,
     );
-    let growth = ring_sums(outwards).xy / (real(NODES) * (radius.x * radius.x + radius.y * radius.y));
+    let growth = ring_sums(outwards).xy / (real(node_count()) * (radius.x * radius.x + radius.y * radius.y));
     let ex = rises_of_places(new_x).here;
     let ey = rises_of_places(new_y).here;
     let fx = relative(ex, rises(slopes.a).here, growth);
@@ -130,14 +130,14 @@ fn excess(longer: real, more: real, dearer: real) -> real {
     let plain = quotient(total_tension(), sums.y) - p.polygon_ratio;
     if !IS_SHORT { return plain; }
     if CRYSTAL {
-        let energy_at_rest = real(NODES) * p.law[AT_REST];
+        let energy_at_rest = real(node_count()) * p.law[AT_REST];
         let known = !(sums.y <= real(0.0) || energy_at_rest <= real(0.0));
         let energy = dearer / energy_at_rest;
         let wider = real(0.5) * more / regular.area;
         let over = (p.law[AT_REST + 2u] + energy * (real(2.0) + energy)) - wider;
         return select(plain, p.polygon_ratio * over / (real(1.0) + wider), known);
     }
-    let own = real(NODES) * regular.edge;
+    let own = real(node_count()) * regular.edge;
     let unit = p.law[QUOTIENT];
     let over = longer * (own + own + longer) - p.polygon_ratio * unit * (real(0.5) * more);
     return select(over / (unit * sums.y), plain, sums.y <= real(0.0));
@@ -161,9 +161,9 @@ fn turned(z: vec2<real>, w: Complex) -> Complex {
 /// ωⁱ, an n-th root of unity, at the nodes: by the nearest quarter of a turn, which is at most π/4 away.
 fn root() -> Complex {
     let i = vec4(first) + vec4(0u, 1u, 2u, 3u);
-    let quarter = (8u * i + NODES) / (2u * NODES);
-    let past = vec4<i32>(4u * i) - vec4<i32>(quarter * NODES);
-    let angle = real(1.5707963267948966) / real(NODES) * vec(past);
+    let quarter = (8u * i + node_count()) / (2u * node_count());
+    let past = vec4<i32>(4u * i) - vec4<i32>(quarter * node_count());
+    let angle = real(1.5707963267948966) / real(node_count()) * vec(past);
     let square = angle * angle;
     var sine = vec(1.0);
     var cosine = vec(1.0);

@@ -2,8 +2,8 @@
 // exchange_subgroup.wgsl has the same functions with the same results for workgroups of one subgroup.
 
 /// Fields that neighbours need, one entry per block.
-var<workgroup> ring_a: array<vec, BLOCKS>;
-var<workgroup> ring_b: array<vec, BLOCKS>;
+var<workgroup> ring_a: array<vec, ROWS>;
+var<workgroup> ring_b: array<vec, ROWS>;
 
 @compute @workgroup_size(THREADS)
 fn evolve(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {

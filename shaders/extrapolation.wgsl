@@ -156,7 +156,7 @@ fn errors_of_attempt(largest: LargestGaps) -> vec2<real> {
     if IS_SHORT {
         var noise = size * real(NOISE * EPSILON);
         if all_parameters[member].pull > real(0.0) {
-            let edge = sums.x / real(NODES);
+            let edge = sums.x / real(node_count());
             noise += real(NOISE_OF_POLYGON) / (edge * edge);
         }
         scale = max(scale, noise / tolerance());

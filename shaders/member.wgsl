@@ -150,6 +150,12 @@ struct Dispatch {
     blocks: u32,
     /// Groups in which maxima are taken: about the root of BLOCKS.
     groups: u32,
+    /// NODES and FOURS, where the kernel is not made for one size.
+    nodes: u32,
+    fours: u32,
+    /// The cosine and the sine of π/n.
+    half_cosine: f32,
+    half_sine: f32,
 }
 
 @group(0) @binding(0) var<uniform> dispatch: Dispatch;

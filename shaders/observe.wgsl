@@ -51,7 +51,7 @@ fn is_finite() -> bool {
 /// Whether the curve has become singular: it is unresolved, an edge has vanished, its lengths mean nothing, it has
 /// shrunk, or its turning number is no longer `turning`.
 fn is_singular(turning: real) -> bool {
-    let mean_edge = sums.x / real(NODES);
+    let mean_edge = sums.x / real(node_count());
     let resolved = extremes.x <= real(MAX_TURN);
     let apart = real(MIN_EDGE) * mean_edge <= -extremes.w;
     let measured = extremes.y <= real(MAX_DRIFT);
@@ -158,9 +158,9 @@ fn observe(wx: Window, wy: Window, kh: vec, stored: vec, moved: vec) {
     let others_of_block = vec(block_max_signed(kh), block_max_signed(-kh), block_max(bounded_abs(moved)), 0.0);
     settle();
     let all = ring_summary(part, extremes_of_block, others_of_block);
-    let length = real(NODES) * regular.edge + all.sums.x;
+    let length = real(node_count()) * regular.edge + all.sums.x;
     sums = vec(length, regular.area + real(0.5) * all.sums.y, all.sums.zw);
-    if CRYSTAL { sums.z = real(NODES) * all_parameters[member].law[AT_REST] + all.sums.z; }
+    if CRYSTAL { sums.z = real(node_count()) * all_parameters[member].law[AT_REST] + all.sums.z; }
     extremes = all.extremes;
     others = all.others;
     distance = excess(all.sums.x, all.sums.y, all.sums.z);

@@ -73,7 +73,7 @@ fn is_at_goal() -> bool {
 /// says nothing. Where solves are refined only that of the parts remains.
 fn allowed(h: real, length: real) -> real {
     if REFINED { return tolerance(); }
-    let edge = length / real(NODES);
+    let edge = length / real(node_count());
     return max(real(4.0 * ROUNDING * EPSILON) * (sqrt(h) / (edge * edge)), all_parameters[member].adaptive);
 }
 
@@ -116,7 +116,7 @@ fn choose(length: real, order: u32, errors: vec2<real>, most_growth: real, most:
 /// The longest step that short numbers can solve for: the largest weight of its systems, WEIGHT times `h/(L/n)⁴`, times
 /// ε is the error of a solution, and above 1 no refinement helps.
 fn longest_step(length: real) -> real {
-    let edge = length / real(NODES);
+    let edge = length / real(node_count());
     return real(1.0 / (WEIGHT * EPSILON)) * (edge * edge) * (edge * edge);
 }
 
@@ -128,6 +128,6 @@ fn refinements(h: real, length: real) -> u32 {
 
 /// The shortest step to try, `share` of `(L/n)⁴`.
 fn least_step(share: real) -> real {
-    let edge = all_reports[member].report.now.length / real(NODES);
+    let edge = all_reports[member].report.now.length / real(node_count());
     return max(share * (edge * edge) * (edge * edge), all_parameters[member].time_tick);
 }

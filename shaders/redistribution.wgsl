@@ -29,7 +29,7 @@ fn redistribute(moves: bool) -> real {
     let sums = ring_sums(vec(block_sum(r), block_sum(rkb), 0.0, 0.0));
     let length = sums.x;
     let mean_rkb = sums.y / length;
-    let mean_length = length / real(NODES);
+    let mean_length = length / real(node_count());
     var growth = -(tau * (k * beta));
     if moves {
         tangential_velocity(r, mean_rkb, mean_length);

@@ -9,18 +9,34 @@
 // that repeat the last block and write nothing of it: lavapipe loses the registers of a partly filled subgroup when a
 // loop with barriers ends.
 
-/// Nodes of a member.
+/// Nodes of a member, blocks of four nodes, which come first, and the number of blocks. 0: the dispatch says it, and a
+/// kernel serves all sizes that take as many threads.
 override NODES: u32;
-/// Blocks of four nodes; they come first.
 override FOURS: u32;
-/// Number of blocks.
 override BLOCKS: u32;
 /// Threads: at least one per block, in whole subgroups.
 override THREADS: u32;
+/// Rows of an array with one row per block.
+override ROWS: u32;
 
-/// The cosine and the sine of π/n.
-override HALF_COSINE: f32;
-override HALF_SINE: f32;
+fn is_for_one_size() -> bool {
+    return NODES != 0u;
+}
+
+fn node_count() -> u32 {
+    if is_for_one_size() { return NODES; }
+    return dispatch.nodes;
+}
+
+fn four_count() -> u32 {
+    if is_for_one_size() { return FOURS; }
+    return dispatch.fours;
+}
+
+fn block_count() -> u32 {
+    if is_for_one_size() { return BLOCKS; }
+    return dispatch.blocks;
+}
 
 /// This thread, its block, and the first node of the block.
 var<private> lane: u32;
@@ -37,26 +53,26 @@ var<private> after: u32;
 
 fn take_block(thread: u32) {
     lane = thread;
-    block = min(thread, BLOCKS - 1u);
-    before = (block + BLOCKS - 1u) % BLOCKS;
-    after = (block + 1u) % BLOCKS;
-    is_four = block < FOURS;
-    before_is_four = before < FOURS;
-    first = select(3u * block + FOURS, 4u * block, is_four);
-    owns = select(0u, select(3u, 4u, is_four), thread < BLOCKS);
+    block = min(thread, block_count() - 1u);
+    before = (block + block_count() - 1u) % block_count();
+    after = (block + 1u) % block_count();
+    is_four = block < four_count();
+    before_is_four = before < four_count();
+    first = select(3u * block + four_count(), 4u * block, is_four);
+    owns = select(0u, select(3u, 4u, is_four), thread < block_count());
 }
 
 /// Whether any block has three nodes.
 fn has_threes() -> bool {
-    return FOURS < BLOCKS;
+    return four_count() < block_count();
 }
 
 /// The row of the block in a field, and in the field that is `by` fields after that of `row`.
 fn row_in(field: u32) -> u32 {
-    return field * BLOCKS + block;
+    return field * block_count() + block;
 }
 fn row_after(row: u32, by: u32) -> u32 {
-    return row + by * BLOCKS;
+    return row + by * block_count();
 }
 
 /// The group of the block, for taking maxima.
@@ -79,22 +95,22 @@ fn stays(stride: u32) -> bool {
 
 /// Whether the block before it in the ring leaves. In a ring of an odd number the first and the last block both stay.
 fn before_leaves(stride: u32) -> bool {
-    return block > 0u || ((BLOCKS - 1u) & stride) != 0u;
+    return block > 0u || ((block_count() - 1u) & stride) != 0u;
 }
 
 /// Whether the block after it in the ring leaves.
 fn after_leaves(stride: u32) -> bool {
-    return block + stride < BLOCKS;
+    return block + stride < block_count();
 }
 
 /// The block before it in the ring.
 fn before_by(stride: u32) -> u32 {
-    return select(block - stride, (BLOCKS - 1u) & ~(stride - 1u), block == 0u);
+    return select(block - stride, (block_count() - 1u) & ~(stride - 1u), block == 0u);
 }
 
 /// The block after it in the ring.
 fn after_by(stride: u32) -> u32 {
-    return select(0u, block + stride, block + stride < BLOCKS);
+    return select(0u, block + stride, block + stride < block_count());
 }
 
 /// A field on the nodes first-2 ... first+5.
@@ -168,6 +184,6 @@ fn after_third(own: vec, front: vec2<real>) -> vec2<real> {
 
 /// `v` with the last node of the ring set to zero.
 fn without_last_node(v: vec) -> vec {
-    if block < BLOCKS - 1u { return v; }
+    if block < block_count() - 1u { return v; }
     return select(vec(v.xy, 0.0, v.w), vec(v.xyz, 0.0), is_four);
 }

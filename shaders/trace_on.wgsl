@@ -6,7 +6,7 @@
 const TRACE_FIELDS = 20u;
 
 fn trace(field: u32, value: vec) {
-    let base = (member * TRACE_FIELDS + field) * NODES + first;
+    let base = (member * TRACE_FIELDS + field) * node_count() + first;
     if owns == 0u { return; }
     traces[base] = value.x;
     traces[base + 1u] = value.y;

@@ -72,7 +72,7 @@ impl Kernel {
         Kernel {
             name: format!("{variant:?}, n = {n}"),
             code: format!("{enable}{}", shader::source::<f32>(variant)),
-            constants: shader::constants(blocks, 32).into_iter().collect(),
+            constants: shader::constants(shader::sizes(blocks, 32, variant.for_one_size)).into_iter().collect(),
         }
     }
 

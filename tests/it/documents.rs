@@ -289,7 +289,8 @@ fn generated(page: &str, text: &str) {
 /// Sentences of the pages with numbers that the program has as constants.
 fn facts() -> Vec<(&'static str, String)> {
     let blocks = Blocks::new(100).unwrap();
-    let bytes = [workgroup_bytes::<f32>, workgroup_bytes::<f64>].map(|of| of(blocks, Variant::of(Solver::GaussSeidel)));
+    let bytes =
+        [workgroup_bytes::<f32>, workgroup_bytes::<f64>].map(|of| of(blocks.count(), Variant::of(Solver::GaussSeidel)));
     vec![
         (FLAGS, format!("A spec has at most {MAX_EVENTS} events.")),
         ("shaders/README.md", format!("{} bytes in f32 and {} in f64 at n = 100", bytes[0], bytes[1])),

@@ -33,6 +33,8 @@ use naga::{
     valid::{Capabilities, ModuleInfo, ShaderStages, SubgroupOperationSet, ValidationFlags, Validator},
 };
 
+/// Threads of a subgroup.
+const SUBGROUP: u32 = 32;
 const SWEEPS: Variant = Variant::of(Solver::GaussSeidel);
 
 /// The sources of all kernels one after another.
@@ -70,7 +72,8 @@ fn validated<T: Real>(
 /// The module with its sizes filled in for rings of `n` nodes.
 fn sized<T: Real>(n: usize, variant: Variant) -> (Module, ModuleInfo) {
     let (module, info) = validated::<T>(&shader::source::<T>(variant), variant, capabilities::<T>()).unwrap();
-    let constants = shader::constants(Blocks::new(n).unwrap(), 32);
+    let sizes = shader::sizes(Blocks::new(n).unwrap(), SUBGROUP, variant.for_one_size);
+    let constants = shader::constants(sizes);
     let constants = constants.iter().map(|(name, value)| (name.to_string(), *value)).collect();
     let (module, info) = naga::back::pipeline_constants::process_overrides(&module, &info, None, &constants).unwrap();
     (module.into_owned(), info.into_owned())
@@ -207,20 +210,26 @@ fn bindings_are_found_by_name_where_the_host_puts_them() {
     }
 }
 
+/// All variants, for one size and for many.
+fn both_kinds() -> Vec<Variant> {
+    Variant::all().into_iter().flat_map(|own| [own, Variant { for_one_size: false, ..own }]).collect()
+}
+
 #[test]
 fn workgroup_memory_is_what_the_host_counts() {
     for (n, variant) in
-        [6, 7, 100, 257, 1024].into_iter().flat_map(|n| Variant::all().into_iter().map(move |variant| (n, variant)))
+        [6, 7, 100, 257, 1024].into_iter().flat_map(|n| both_kinds().into_iter().map(move |variant| (n, variant)))
     {
         let blocks = Blocks::new(n).unwrap();
+        let rows = if variant.for_one_size { blocks.count() } else { shader::threads(blocks, SUBGROUP) };
         let (module, _) = sized::<f64>(n, variant);
         let mut layouter = naga::proc::Layouter::default();
         layouter.update(module.to_ctx()).unwrap();
         let in_workgroup = module.global_variables.iter().filter(|(_, v)| v.space == AddressSpace::WorkGroup);
         let bytes: u32 = in_workgroup.map(|(_, v)| layouter[v.ty].size).sum();
-        let counted = shader::workgroup_bytes::<f64>(blocks, variant);
+        let counted = shader::workgroup_bytes::<f64>(rows, variant);
         assert!(bytes as usize == counted, "n = {n}: {bytes}, counted {counted}");
-        if n <= 512 && variant.solver == Solver::GaussSeidel {
+        if n <= 512 && variant.for_one_size && variant.solver == Solver::GaussSeidel {
             assert!(counted <= 16_384, "n = {n} exceeds what every WebGPU device has: {counted}");
         }
     }
@@ -446,7 +455,8 @@ fn noop_device() -> wgpu::Device {
 /// The error of building the pipeline and binding `buffers` storage buffers after the uniform one.
 fn pipeline_error<T: Real>(device: &wgpu::Device, n: usize, variant: Variant, buffers: u32) -> Option<String> {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    let pipeline = kernel::compile::<T>(device, Blocks::new(n).unwrap(), 32, variant);
+    let sizes = shader::sizes(Blocks::new(n).unwrap(), SUBGROUP, variant.for_one_size);
+    let pipeline = kernel::compile::<T>(device, sizes, variant);
     let buffer = |usage| {
         device.create_buffer(&wgpu::BufferDescriptor { label: None, size: 4096, usage, mapped_at_creation: false })
     };

@@ -218,8 +218,10 @@ fn missing_twins_and_unnecessary_exceptions_are_found() {
 /// or from how the ring is cut.
 fn index_arithmetic(text: &str) -> Vec<&str> {
     let computes = |line: &str| {
-        let code = line.split("//").next().unwrap_or("").replace(", BLOCKS>", "");
-        ["%", "BLOCKS", "FOURS", "NODES /", "NODES >>", "NODES -"].iter().any(|sign| code.contains(sign))
+        let code = line.split("//").next().unwrap_or("");
+        ["%", "block_count", "four_count", "node_count() /", "node_count() >>", "node_count() -"]
+            .iter()
+            .any(|sign| code.contains(sign))
     };
     text.lines().filter(|line| computes(line)).collect()
 }

@@ -88,10 +88,10 @@ impl WebGpu {
             let bytes = binding.bytes::<f32>(self.blocks, self.mirror.slots());
             json!({ "name": binding.name(), "bytes": bytes, "uniform": *binding == Binding::Dispatch })
         };
-        let constants = shader::constants(self.blocks, Capacity::LEAST.subgroup);
+        let sizes = shader::sizes(self.blocks, Capacity::LEAST.subgroup, self.variant.for_one_size);
         json!({
             "code": shader::source::<f32>(self.variant),
-            "constants": constants.into_iter().collect::<BTreeMap<_, _>>(),
+            "constants": shader::constants(sizes).into_iter().collect::<BTreeMap<_, _>>(),
             "buffers": Binding::ALL.iter().take(BOUND).map(buffer).collect::<Vec<_>>(),
             "back": BACK.map(|binding| binding as usize),
         })

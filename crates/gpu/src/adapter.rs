@@ -14,7 +14,7 @@ use crate::{
     clock::Moment,
     pipeline::{self, Key},
 };
-use curvelax_backend::gpu::{Capacity, Variant};
+use curvelax_backend::gpu::{Capacity, Variant, shader};
 use curvelax_base::{
     error::{Error, Result, one_line},
     guard::guarded,
@@ -31,6 +31,8 @@ const PERIOD: Duration = Duration::from_millis(100);
 pub struct Gpu {
     adapter: wgpu::Adapter,
     info: wgpu::AdapterInfo,
+    /// Whether kernels are compiled for one size.
+    for_one_size: bool,
     /// The device and its pipelines, once they are needed.
     opened: Mutex<Option<(OpenGpu, HashMap<Key, wgpu::ComputePipeline>)>>,
 }
@@ -59,11 +61,12 @@ impl Gpu {
         let adapters = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
         let mut found: Vec<Gpu> = adapters
             .into_iter()
-            .map(|adapter| Gpu { info: adapter.get_info(), adapter, opened: Mutex::default() })
+            .map(|adapter| Gpu { info: adapter.get_info(), adapter, for_one_size: false, opened: Mutex::default() })
             .collect();
         // The no-op back end computes nothing but calls itself a CPU device.
         found.retain(|gpu| gpu.info.backend != wgpu::Backend::Noop);
         found.sort_by_key(|gpu| gpu.rank());
+        found.iter_mut().for_each(|gpu| gpu.for_one_size = gpu.is_hardware());
         found
     }
 
@@ -142,6 +145,7 @@ impl Gpu {
             workgroup_bytes: limits.max_compute_workgroup_storage_size as usize,
             subgroup: most,
             least_subgroup: if usable { least } else { 0 },
+            for_one_size: self.for_one_size,
         }
     }
 
@@ -154,9 +158,10 @@ impl Gpu {
         };
         let [least, most] = self.subgroups();
         let subgroup = if variant.subgroup { least } else { most };
+        let sizes = shader::sizes(blocks, subgroup, variant.for_one_size);
         let pipeline = pipelines
-            .entry((blocks.n, T::NAME, variant))
-            .or_insert_with(|| pipeline::compile::<T>(&device.device, blocks, subgroup, variant));
+            .entry((sizes, T::NAME, variant))
+            .or_insert_with(|| pipeline::compile::<T>(&device.device, sizes, variant));
         Ok((device.clone(), pipeline.clone()))
     }
 
@@ -207,6 +212,12 @@ impl Gpu {
             }
         };
         Err(Error::Device(format!("GPU {}: {fault}", self.name())))
+    }
+
+    /// Returns the same adapter with the kernels that hardware has, to test them.
+    #[doc(hidden)]
+    pub fn with_kernels_of_hardware(&self) -> Gpu {
+        Gpu { adapter: self.adapter.clone(), info: self.info.clone(), for_one_size: true, opened: Mutex::default() }
     }
 
     /// Makes all kernels lose the device, as a driver reset does, to test the recovery.

@@ -1,21 +1,19 @@
 //! The compute pipeline, specialised for a ring, a precision and a variant.
 
-use curvelax_backend::gpu::{Variant, shader};
-use curvelax_flow::{number::Real, solver::Blocks};
+use curvelax_backend::gpu::{
+    Variant,
+    shader::{self, KernelSizes},
+};
+use curvelax_flow::number::Real;
 
-/// The key of a pipeline: its ring, number and variant.
-pub(super) type Key = (usize, &'static str, Variant);
+/// The key of a pipeline: its sizes, number and variant.
+pub(super) type Key = (KernelSizes, &'static str, Variant);
 
-/// Compiles the pipeline for subgroups of `subgroup` threads.
+/// Compiles the pipeline.
 ///
 /// The driver caches compiled code across processes (Mesa in `MESA_SHADER_CACHE_DIR`, NVIDIA in its ComputeCache);
 /// wgpu's own pipeline cache needs `unsafe`, see `docs/internals/decisions.md`.
-pub fn compile<T: Real>(
-    device: &wgpu::Device,
-    blocks: Blocks,
-    subgroup: u32,
-    variant: Variant,
-) -> wgpu::ComputePipeline {
+pub fn compile<T: Real>(device: &wgpu::Device, sizes: KernelSizes, variant: Variant) -> wgpu::ComputePipeline {
     let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
         label: Some("evolve"),
         source: wgpu::ShaderSource::Wgsl(shader::source::<T>(variant).into()),
@@ -26,7 +24,7 @@ pub fn compile<T: Real>(
         module: &module,
         entry_point: Some("evolve"),
         compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &shader::constants(blocks, subgroup),
+            constants: &shader::constants(sizes),
             zero_initialize_workgroup_memory: false,
         },
         cache: None,

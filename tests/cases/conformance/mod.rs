@@ -4,6 +4,7 @@
 //! Having no adapter is a failure, unless `ALLOW_NO_GPU=1`: then every case is reported as ignored.
 
 mod forces;
+mod hardware;
 mod programs;
 
 use std::{
@@ -42,8 +43,8 @@ use programs::{
 };
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
-/// blocks of three), and one beyond 64 threads. Each has kernels of its own, whose compiler takes most of the time, so
-/// `tests/run` has three of them, and `tests/run --all` has all.
+/// blocks of three), and one beyond 64 threads. `tests/run` has three of them, `tests/run --all` all. The compiler takes
+/// most of the time; a kernel serves all rings of as many threads.
 const SIZES: [usize; 6] = [6, 7, 64, 99, 101, 257];
 const FEW_SIZES: [usize; 3] = [7, 64, 101];
 
@@ -82,14 +83,28 @@ pub fn trials() -> Vec<Trial> {
     for (index, gpu) in found.iter().enumerate() {
         println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
         cases::<f32>(index, &mut trials);
+        if !gpu.is_hardware() {
+            hardware::cases::<f32>(index, &mut trials);
+        }
         if gpu.capacity().best_precision() == Precision::F64 {
             cases::<f64>(index, &mut trials);
+            if !gpu.is_hardware() {
+                hardware::cases::<f64>(index, &mut trials);
+            }
         }
     }
     if !found.is_empty() {
         trials.push(Trial::test("the program says which kernel it compares before it compiles it", check_tells));
     }
     trials
+}
+
+/// Counts a case if it has passed.
+fn passed(outcome: Outcome) -> Outcome {
+    if outcome.is_ok() {
+        PASSED.fetch_add(1, Ordering::Relaxed);
+    }
+    outcome
 }
 
 /// Appends to the file that CURVELAX_CASES names how many cases have passed, and where they ran, for scripts.
@@ -111,11 +126,7 @@ fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
         let word = solver.name();
         let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
             let name = format!("{} {word} adapter {index}: {name}", T::NAME);
-            trials.push(Trial::test(name, move || {
-                case(&Gpu::list()[index], solver, n)?;
-                PASSED.fetch_add(1, Ordering::Relaxed);
-                Ok(())
-            }));
+            trials.push(Trial::test(name, move || passed(case(&Gpu::list()[index], solver, n))));
         };
         for n in sizes(&SIZES, &FEW_SIZES) {
             add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);

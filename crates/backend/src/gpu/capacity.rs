@@ -19,12 +19,20 @@ pub struct Capacity {
     pub subgroup: u32,
     /// Threads of the smallest subgroup; 0 if shaders may not use subgroups.
     pub least_subgroup: u32,
+    /// Whether kernels are compiled for one size, as for hardware.
+    pub for_one_size: bool,
 }
 
 impl Capacity {
     /// The minimum of every WebGPU device.
-    pub const LEAST: Capacity =
-        Capacity { f64: false, threads: 256, workgroup_bytes: 16_384, subgroup: 32, least_subgroup: 0 };
+    pub const LEAST: Capacity = Capacity {
+        f64: false,
+        threads: 256,
+        workgroup_bytes: 16_384,
+        subgroup: 32,
+        least_subgroup: 0,
+        for_one_size: true,
+    };
 
     /// Returns the precision of a run that does not ask for one.
     pub fn best_precision(&self) -> Precision {
@@ -43,16 +51,19 @@ impl Capacity {
         if threads > self.threads {
             return Err(format!("{threads} threads a workgroup, and the adapter has {}", self.threads));
         }
-        let bytes = shader::workgroup_bytes::<T>(blocks, Variant::of(solver));
+        let bytes = shader::workgroup_bytes::<T>(blocks.count(), Variant::of(solver));
         if bytes > self.workgroup_bytes {
             return Err(format!("{bytes} bytes of workgroup memory, and the adapter has {}", self.workgroup_bytes));
         }
         Ok(())
     }
 
-    /// Returns the fixed-step kernel that suits a ring: sweeps by shuffles if every possible subgroup holds it.
+    /// Returns the fixed-step kernel that suits a ring: sweeps by shuffles if every possible subgroup holds it; for one
+    /// size on hardware, and where there is no room for a row per thread.
     pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
         let subgroup = solver.facts().kernel.shuffles && blocks.count() <= self.least_subgroup as usize;
-        Variant { subgroup, ..Variant::of(solver) }
+        let threads = shader::threads(blocks, self.subgroup);
+        let fits = shader::workgroup_bytes::<f64>(threads, Variant::of(solver)) <= self.workgroup_bytes;
+        Variant { subgroup, for_one_size: self.for_one_size || !fits, ..Variant::of(solver) }
     }
 }

@@ -8,6 +8,7 @@ use curvelax_flow::{
     number::Real,
     scheme::{
         Parameters,
+        excess::half_angle,
         member::{Counters, Report},
         run::Run,
         state::{STATE_FIELDS, State},
@@ -16,7 +17,8 @@ use curvelax_flow::{
 };
 
 /// Field names of the parameters of one dispatch, in memory order.
-pub const DISPATCH_FIELDS: [&str; 6] = ["steps", "max_sweeps", "most_order", "sweeps", "blocks", "groups"];
+pub const DISPATCH_FIELDS: [&str; 10] =
+    ["steps", "max_sweeps", "most_order", "sweeps", "blocks", "groups", "nodes", "fours", "half_cosine", "half_sine"];
 
 /// Parameters of one dispatch.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
@@ -28,6 +30,10 @@ struct Dispatch {
     sweeps: u32,
     blocks: u32,
     groups: u32,
+    nodes: u32,
+    fours: u32,
+    half_cosine: f32,
+    half_sine: f32,
 }
 
 /// What members may do.
@@ -194,9 +200,12 @@ impl<T: Real> Mirror<T> {
 
     /// Passes on what is to be written before a dispatch: the buffer, the first byte, and the bytes.
     pub fn upload(&mut self, Budget { steps, sweeps }: Budget, caps: Caps, write: impl Fn(Binding, u64, &[u8])) {
-        let blocks = self.blocks.count() as u32;
         let Caps { max_sweeps, most_order } = caps;
-        let asked = Dispatch { steps, max_sweeps, most_order, sweeps, blocks, groups: blocks.isqrt() };
+        let [nodes, fours, blocks] = [self.blocks.n, self.blocks.fours, self.blocks.count()].map(|count| count as u32);
+        let groups = blocks.isqrt();
+        let [half_cosine, half_sine] = half_angle(self.blocks.n).map(|number| number as f32);
+        let asked =
+            Dispatch { steps, max_sweeps, most_order, sweeps, blocks, groups, nodes, fours, half_cosine, half_sine };
         write(Binding::Dispatch, 0, bytemuck::bytes_of(&asked));
         write(Binding::Due, 0, bytemuck::cast_slice(&self.due));
         // From the first changed slot to the last: needless uploads in between only write back what came from the

@@ -2,7 +2,6 @@
 
 use curvelax_flow::{
     number::Real,
-    scheme::excess::half_angle,
     solver::{Blocks, Solver},
 };
 use curvelax_shaders::{self as shaders, ShaderPart};
@@ -30,6 +29,9 @@ pub struct Variant {
     pub traced: bool,
     /// A workgroup is one subgroup, whose threads exchange values by shuffles instead of barriers.
     pub subgroup: bool,
+    /// Is compiled for one size, which makes it faster. Otherwise it serves all rings of as many threads: software GPUs
+    /// take longer to compile a kernel than to run it.
+    pub for_one_size: bool,
 }
 
 impl Variant {
@@ -52,7 +54,8 @@ impl Variant {
     /// Returns the variant for fixed steps.
     pub const fn of(solver: Solver) -> Variant {
         let (adaptive, watched, geometric, crystal, forced) = (false, false, false, false, false);
-        Variant { solver, adaptive, watched, geometric, crystal, forced, traced: false, subgroup: false }
+        let (traced, subgroup, for_one_size) = (false, false, true);
+        Variant { solver, adaptive, watched, geometric, crystal, forced, traced, subgroup, for_one_size }
     }
 
     /// Returns the files of the kernel in precision `T`, in the order of the step.
@@ -151,31 +154,35 @@ pub fn lanes_in_use(blocks: Blocks, subgroup: u32) -> f64 {
     blocks.n as f64 / (4 * threads(blocks, subgroup)) as f64
 }
 
-/// Returns the `override` constants that size the kernel.
-pub fn constants(blocks: Blocks, subgroup: u32) -> [(&'static str, f64); 6] {
-    let [cosine, sine] = half_angle(blocks.n);
-    [
-        ("HALF_COSINE", cosine),
-        ("HALF_SINE", sine),
-        ("NODES", blocks.n as f64),
-        ("FOURS", blocks.fours as f64),
-        ("BLOCKS", blocks.count() as f64),
-        ("THREADS", threads(blocks, subgroup) as f64),
-    ]
+/// The values of the `override` constants that size a kernel, [`CONSTANTS`].
+pub type KernelSizes = [usize; 5];
+
+/// The names of these constants.
+pub const CONSTANTS: [&str; 5] = ["NODES", "FOURS", "BLOCKS", "ROWS", "THREADS"];
+
+/// Returns the sizes of a kernel for rings cut by `blocks`, or for all rings of as many threads.
+pub fn sizes(blocks: Blocks, subgroup: u32, for_one_size: bool) -> KernelSizes {
+    let (threads, count) = (threads(blocks, subgroup), blocks.count());
+    if for_one_size { [blocks.n, blocks.fours, count, count, threads] } else { [0, 0, 0, threads, threads] }
+}
+
+/// Returns the constants of a kernel of these sizes, for wgpu.
+pub fn constants(sizes: KernelSizes) -> [(&'static str, f64); 5] {
+    std::array::from_fn(|i| (CONSTANTS[i], sizes[i] as f64))
 }
 
 /// Numbers and integers of a `Plan` in the kernel.
 const PLAN: (usize, usize) = (2, 5);
 
-/// Returns the bytes of workgroup memory of the kernel: rows of four numbers per block, the plan of an
-/// attempt, a decision and the member.
+/// Returns the bytes of workgroup memory of the kernel for arrays of `rows` rows, of four numbers each, one per block:
+/// those, the plan of an attempt, a decision and the member.
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
-pub fn workgroup_bytes<T: Real>(blocks: Blocks, variant: Variant) -> usize {
+pub fn workgroup_bytes<T: Real>(rows: usize, variant: Variant) -> usize {
     let kernel = &variant.solver.facts().kernel;
-    let rows = if variant.subgroup { 1 } else { kernel.rows_per_block };
+    let arrays = if variant.subgroup { 1 } else { kernel.rows_per_block };
     let integers = (PLAN.1 * size_of::<u32>()).next_multiple_of(size_of::<T>());
-    (4 * rows * blocks.count() + PLAN.0) * size_of::<T>() + integers + 2 * size_of::<u32>()
+    (4 * arrays * rows + PLAN.0) * size_of::<T>() + integers + 2 * size_of::<u32>()
 }
 
 #[cfg(test)]
