@@ -150,8 +150,9 @@ class Keys(TypedDict, total=False):
 
     refine: bool
     """Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n →
-    ∞: columns t_limit, t_error, order and points of summary.csv. Members whose times do not converge there also run
-    with √2 n, 2n, … up to 1600 nodes. By default false."""
+    ∞: columns t_limit, t_error, order and points of summary.csv; with drive t_vanish, too: t_vanish_limit and
+    t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to 1600 nodes. By default
+    false."""
 
     accuracy: float
     """Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling

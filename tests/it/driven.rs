@@ -2,7 +2,10 @@
 
 use std::f64::consts::PI;
 
-use crate::common::program::{Row, column, number, run};
+use crate::common::{
+    command,
+    program::{Row, column, number, run},
+};
 
 /// One unperturbed curve with these flags.
 fn one(flags: &str) -> Row {
@@ -122,6 +125,46 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     assert!(((t - small) / left - 1.0).abs() < 1e-3, "{t} {small} {left}");
     // The area falls at the rate F L, and theory has no rate.
     assert_eq!(done.rows("rates.csv")[0]["rate_theory"], "");
+}
+
+#[test]
+fn when_a_member_vanishes_has_a_limit_that_its_bar_holds() {
+    // A circle of radius 1 vanishes at 1/F.
+    let circles = "--shape circle:1 --amplitude 0 --points 48 --accurate --curves 4 --drive uniform(0.4..0.8)";
+    let done = run(circles);
+    for (row, force) in done.summary().iter().zip(column(&done.rows("members.csv"), "drive_1")) {
+        let [limit, error] = ["t_vanish_limit", "t_vanish_error"].map(|name| number(row, name));
+        assert!((limit * force - 1.0).abs() <= error * force && error * force < 1e-4, "{limit} ± {error}, F = {force}");
+    }
+    // One that relaxes first has both limits, and the median is that of the limits.
+    let ellipses = |points: usize| {
+        run(&format!("--shape ellipse:1.6,1 --amplitude 0.03 --curves 6 --drive 0.5 --accurate --points {points}"))
+    };
+    let (few, many) = (ellipses(64), ellipses(200));
+    for (row, truth) in few.summary().iter().zip(&many.summary()) {
+        for [limit, error] in [["t_limit", "t_error"], ["t_vanish_limit", "t_vanish_error"]] {
+            let off = number(row, limit) - number(truth, limit);
+            assert!(off.abs() <= number(row, error) + number(truth, error), "{limit}: {row:?} {truth:?}");
+        }
+        // The control: what 64 nodes give is outside.
+        assert!((number(row, "t_vanish") - number(truth, "t_vanish_limit")).abs() > number(row, "t_vanish_error"));
+    }
+    let cell = &few.rows("ensemble.csv")[0];
+    let mut limits = column(&few.summary(), "t_vanish_limit");
+    limits.sort_by(f64::total_cmp);
+    assert_eq!(number(cell, "t_vanish_limit_known"), 6.0);
+    assert_eq!(number(cell, "t_vanish_limit_median"), 0.5 * limits[2] + 0.5 * limits[3]);
+    assert!(few.text("report.html").contains("median t_vanish_limit"));
+    let levels = few.rows("levels.csv");
+    assert!(levels.len() >= 18 && levels.iter().all(|row| number(row, "t_vanish") > number(row, "t_relax")));
+    // Tables that disagree are refused.
+    let (path, told) = (few.path().join("summary.csv"), few.text("summary.csv"));
+    let limit = &few.summary()[2]["t_vanish_limit"];
+    std::fs::write(&path, told.replace(limit, &(limit.clone() + "1"))).unwrap();
+    let told = command::curvelax(few.home.path(), "plot out");
+    let said = String::from_utf8_lossy(&told.stderr);
+    assert_eq!(told.status.code(), Some(2));
+    assert!(said.contains(&format!("column t_vanish_limit: expected {limit}")), "{said}");
 }
 
 #[test]

@@ -135,11 +135,12 @@ fn the_files_have_the_columns_of_the_manual() {
         header("summary.csv"),
         "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
          length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
-         mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,wulff_distance,t_vanish,reduced_area"
+         mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,wulff_distance,t_vanish,reduced_area,\
+         t_vanish_limit,t_vanish_error"
     );
     assert_eq!(
         header("levels.csv"),
-        "member,level,cell,points,adaptive,precision,status,t_relax,solves,turn,excess_start"
+        "member,level,cell,points,adaptive,precision,status,t_relax,solves,turn,excess_start,t_vanish"
     );
     assert_eq!(header("series.csv"), "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift");
     assert_eq!(header("snapshots.csv"), "member,t,i,x,y,k,r");

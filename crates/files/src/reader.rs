@@ -280,8 +280,15 @@ impl<'a> Summary<'a> {
             let values = spec.values_of(member, cell).ok()?;
             linear_rate::rate_of(spec, &values, &outcome)
         });
-        let judged =
-            |of: &Outcome| [("t_limit", of.t_limit), ("t_error", of.t_error), ("t_data_error", of.t_data_error)];
+        let judged = |of: &Outcome| {
+            [
+                ("t_limit", of.t_limit),
+                ("t_error", of.t_error),
+                ("t_data_error", of.t_data_error),
+                ("t_vanish_limit", of.t_vanish_limit),
+                ("t_vanish_error", of.t_vanish_error),
+            ]
+        };
         let (told, points) = (judged(&outcome), outcome.points);
         if let Some((_, spec)) = &self.spec_of {
             self.levels.judge(spec, &mut outcome);

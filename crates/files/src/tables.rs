@@ -59,6 +59,8 @@ columns! { Outcome:
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
     t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a tenth of its length (a crystal until it is at rest, at the latest to a quarter), and the rest is that of a circle; t_end is then a little earlier";
     reduced_area: optional = reduced_area, "with `--conserve`: 4πA/L² of the last polygon";
+    t_vanish_limit: event = t_vanish_limit, "with `--refine`: t_vanish in the limit of many nodes and short steps";
+    t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit";
 }
 
 columns! { LevelRow:
@@ -73,6 +75,7 @@ columns! { LevelRow:
     solves: whole = solves, "as in `summary.csv`";
     turn: number = turn, "largest angle by which the tangent of the initial curve turns at a node, in rad: above 0.5 the nodes do not resolve it";
     excess_start: number = excess_start, "as in `summary.csv`, at these nodes";
+    t_vanish: event = t_vanish, "as in `summary.csv`";
 }
 
 /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
@@ -413,8 +416,8 @@ pub(crate) mod tests {
             "member,cell,status,t_end,steps,rejected,sweeps_k,sweeps_x,t_relax,t_half,rate,rate_r2,length_start,\
              length_end,area_start,area_end,excess_start,excess_end,energy_start,energy_end,k_min,k_max,turning,\
              mesh_ratio,metric_drift,self_crossing,solves,t_limit,t_error,order,label,group,points,t_data_error,\
-             wulff_distance,t_vanish,reduced_area\n\
-             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,,,\n"
+             wulff_distance,t_vanish,reduced_area,t_vanish_limit,t_vanish_error\n\
+             3,0,relaxed,0.5,500,7,1234,987,0.30000000000000004,,6.5,,9.0,8.5,0.0,6.0,0.0,,,0.0,0.0,0.0,1,0.0,0.0,0.25,600,0.5,0.125,,,,0,,,,,,\n"
         );
     }
 

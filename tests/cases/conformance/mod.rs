@@ -43,8 +43,8 @@ use programs::{
 };
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
-/// blocks of three), and one beyond 64 threads. `tests/run` has three of them, `tests/run --all` all. The compiler takes
-/// most of the time; a kernel serves all rings of as many threads.
+/// blocks of three), and one beyond 64 threads. `tests/run` has three of them, `tests/run --all` has all. The compiler
+/// takes most of the time; a kernel serves all rings of as many threads.
 const SIZES: [usize; 6] = [6, 7, 64, 99, 101, 257];
 const FEW_SIZES: [usize; 3] = [7, 64, 101];
 

@@ -14,7 +14,7 @@ const OF_ENERGY: f64 = 0.1;
 /// How much larger they are in the geometric form.
 const OF_GEOMETRIC: f64 = 3.0;
 
-/// The relaxation times of members at all levels.
+/// The times of members at all levels.
 #[derive(Clone, Debug, Default)]
 pub struct LevelTimes {
     /// By level: members, ascending.
@@ -28,13 +28,38 @@ pub struct LevelTimes {
 struct AtLevel {
     member: u64,
     /// Its relaxation time, NaN if it has none.
-    t: f64,
+    t_relax: f64,
+    /// When it vanished, likewise.
+    t_vanish: f64,
     /// Largest turn of the tangent at a node of the initial curve.
     turn: f64,
     /// Excess of the initial curve.
     excess: f64,
     /// The numbers in which it was computed.
     precision: Precision,
+}
+
+/// The excess that stands for the error of steps in a time at which a member vanishes.
+const OF_VANISHING: f64 = 0.01;
+
+/// The times that end a member, each with a limit of its own.
+#[derive(Clone, Copy)]
+enum EndTime {
+    Relaxation,
+    Vanishing,
+}
+
+impl EndTime {
+    const ALL: [EndTime; 2] = [EndTime::Relaxation, EndTime::Vanishing];
+
+    /// The excess at which a member with the curve `at` has it, on whose root the error of steps and rounding depends.
+    /// None decides when a member vanishes: there it is such that bars hold (docs/internals/method.md#limit-beyond).
+    fn excess(self, spec: &Spec, at: &AtLevel) -> f64 {
+        match self {
+            EndTime::Relaxation => spec.threshold(at.excess),
+            EndTime::Vanishing => OF_VANISHING,
+        }
+    }
 }
 
 /// A time at consecutive levels, at each of which it is known.
@@ -59,9 +84,9 @@ impl Ladder {
         Ladder { levels, times, precisions }
     }
 
-    /// What it tells of the time `own` at the nodes of `spec`, with the curve at its finest level; nothing if it is too
-    /// short, does not have these nodes, or the time is 0.
-    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel) -> Option<Limit> {
+    /// What it tells of the time `own` at the nodes of `spec`, at which the excess is `excess`, with the curve at its
+    /// finest level; nothing if it is too short, does not have these nodes, or the time is 0.
+    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, excess: f64) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         // What holds at the start has no time to judge.
@@ -70,7 +95,7 @@ impl Ladder {
         }
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
         let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
-        let (turn, excess) = (turn(spec, finest), spec.threshold(finest.excess));
+        let turn = turn(spec, finest);
         // The error of the steps is relative to the root of the excess, and a circle has none.
         if excess <= 0.0 {
             return None;
@@ -100,7 +125,8 @@ impl LevelTimes {
             return Err(format!("a member after {}: members of a level ascend, each once", last.member));
         }
         let LevelRow { member, turn, excess_start: excess, precision, .. } = *row;
-        own.push(AtLevel { member, t: row.t_relax.unwrap_or(f64::NAN), turn, excess, precision });
+        let [t_relax, t_vanish] = [row.t_relax, row.t_vanish].map(|t| t.unwrap_or(f64::NAN));
+        own.push(AtLevel { member, t_relax, t_vanish, turn, excess, precision });
         self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
@@ -121,58 +147,72 @@ impl LevelTimes {
     /// At the level of a variation it is to run if it has its finest time there, whose limit that will be.
     pub fn needs(&self, spec: &Spec, member: u64, level: RefinementLevel) -> bool {
         if let Some(variation) = level.variation() {
-            return self.finest(member).is_some_and(|finest| finest.varied(variation) == level);
+            let finest = |of| self.finest(member, of).is_some_and(|finest| finest.varied(variation) == level);
+            return EndTime::ALL.into_iter().any(finest);
         }
         let Some(top) = level.coarser() else { return false };
-        let ladder = Ladder::up_to(top, |level| self.time(level, member));
-        let Some((own, _)) = self.time(RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0) else {
-            return false;
-        };
-        let (false, Some(finest)) = (ladder.levels.is_empty(), self.at(top, member)) else { return false };
-        // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
-        ladder.limit(spec, own, finest).is_none_or(|limit| limit.needs_more(turn(spec, finest)))
+        let Some(finest) = self.at(top, member) else { return false };
+        EndTime::ALL.into_iter().any(|of| {
+            let ladder = Ladder::up_to(top, |level| self.time(of, level, member));
+            let own = self.time(of, RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0);
+            let Some((own, _)) = own.filter(|_| !ladder.levels.is_empty()) else { return false };
+            // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
+            let limit = ladder.limit(spec, own, finest, of.excess(spec, finest));
+            limit.is_none_or(|limit| limit.needs_more(turn(spec, finest)))
+        })
     }
 
     /// Completes the row of a member of a cell of `spec` that ran at its own resolution: the errors of its times, if it
-    /// ran at the levels, and with `--refine` the limit of its relaxation time.
+    /// ran at the levels, and with `--refine` the limits of those at which it relaxed and vanished.
     pub fn judge(&self, spec: &Spec, outcome: &mut Outcome) {
         let (member, count) = (outcome.member, outcome.events.len());
-        let limit = |ladder: Ladder, own| {
-            let finest = self.at(*ladder.levels.last()?, member)?;
-            ladder.limit(spec, own, finest)
-        };
         let of_event = |(place, own): (usize, &Option<f64>)| {
             let ladder = self.ladder(|level| self.event_time(level, member, [place, count]));
-            limit(ladder, (*own)?)
+            let finest = self.at(*ladder.levels.last()?, member)?;
+            ladder.limit(spec, (*own)?, finest, spec.threshold(finest.excess))
         };
         outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
-        let Some(own) = outcome.t_relax else { return };
-        let ladder = self.ladder(|level| self.time(level, member));
-        let finest = ladder.levels.last().copied();
-        let Some(mut limit) = limit(ladder, own) else { return };
-        let by_radius = self.moved_by(member, Variation::TwiceTheRadius).unwrap_or_default();
-        limit.fixed += by_radius;
-        limit.error += by_radius;
+        let [relaxed, vanished] = [outcome.t_relax, outcome.t_vanish];
+        if let Some((limit, _)) = self.limit(spec, member, vanished, EndTime::Vanishing) {
+            outcome.judged_vanishing = Some(limit);
+            if spec.refine {
+                (outcome.t_vanish_limit, outcome.t_vanish_error) = (Some(limit.t), Some(limit.error));
+            }
+        }
+        let Some((limit, finest)) = self.limit(spec, member, relaxed, EndTime::Relaxation) else { return };
         outcome.judged = Some(limit);
-        outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints);
-        if let (true, Some(finest)) = (spec.refine, finest) {
+        outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints, EndTime::Relaxation);
+        if spec.refine {
             let Limit { t, error, order, .. } = limit;
             (outcome.t_limit, outcome.t_error, outcome.order) = (Some(t), Some(error), order);
             (outcome.points, outcome.is_finer) = (finest.points(spec.points) as u64, finest.is_finer());
         }
     }
 
-    /// The finest level at which the time of a member is known, if it is at its own nodes.
-    fn finest(&self, member: u64) -> Option<RefinementLevel> {
-        let levels = self.ladder(|level| self.time(level, member).filter(|(t, _)| *t > 0.0)).levels;
+    /// The limit of the time `own` of a member, and the finest level on which it rests. Of an outline its error has by
+    /// how much the time moves with corners rounded to twice the radius.
+    fn limit(&self, spec: &Spec, member: u64, own: Option<f64>, of: EndTime) -> Option<(Limit, RefinementLevel)> {
+        let ladder = self.ladder(|level| self.time(of, level, member));
+        let level = *ladder.levels.last()?;
+        let finest = self.at(level, member)?;
+        let mut limit = ladder.limit(spec, own?, finest, of.excess(spec, finest))?;
+        let by_radius = self.moved_by(member, Variation::TwiceTheRadius, of).unwrap_or_default();
+        limit.fixed += by_radius;
+        limit.error += by_radius;
+        Some((limit, level))
+    }
+
+    /// The finest level at which a time of a member is known, if it is at its own nodes.
+    fn finest(&self, member: u64, of: EndTime) -> Option<RefinementLevel> {
+        let levels = self.ladder(|level| self.time(of, level, member).filter(|(t, _)| *t > 0.0)).levels;
         levels.last().copied().filter(|_| levels.contains(&RefinementLevel::FULL))
     }
 
-    /// By how much a variation of its outline moves the time of a member, at its finest level; unknown if it did not
+    /// By how much a variation of its outline moves a time of a member, at its finest level; unknown if it did not
     /// run.
-    fn moved_by(&self, member: u64, variation: Variation) -> Option<f64> {
-        let finest = self.finest(member)?;
-        let [varied, own] = [finest.varied(variation), finest].map(|level| self.time(level, member));
+    fn moved_by(&self, member: u64, variation: Variation, of: EndTime) -> Option<f64> {
+        let finest = self.finest(member, of)?;
+        let [varied, own] = [finest.varied(variation), finest].map(|level| self.time(of, level, member));
         Some((varied?.0 - own?.0).abs())
     }
 
@@ -191,9 +231,14 @@ impl LevelTimes {
         self.times.get(rank(level))?.get(self.place(level, member)?)
     }
 
-    /// The time of a member, and the numbers in which it was computed.
-    fn time(&self, level: RefinementLevel, member: u64) -> Option<(f64, Precision)> {
-        self.at(level, member).map(|at| (at.t, at.precision)).filter(|(t, _)| t.is_finite())
+    /// A time of a member, and the numbers in which it was computed.
+    fn time(&self, of: EndTime, level: RefinementLevel, member: u64) -> Option<(f64, Precision)> {
+        let at = self.at(level, member)?;
+        let t = match of {
+            EndTime::Relaxation => at.t_relax,
+            EndTime::Vanishing => at.t_vanish,
+        };
+        t.is_finite().then_some((t, at.precision))
     }
 
     /// The time of the event at `place` among `count` of a member.

@@ -183,6 +183,8 @@ pub struct LevelRow {
     pub status: Status,
     /// Its relaxation time.
     pub t_relax: Option<f64>,
+    /// When it vanished.
+    pub t_vanish: Option<f64>,
     /// Steps of the paper's scheme that were computed.
     pub solves: u64,
     /// Largest angle by which the tangent of the initial curve turns at a node, in radians.
@@ -205,6 +207,7 @@ impl LevelRow {
             precision,
             status: ended.status,
             t_relax: ended.t_relax,
+            t_vanish: ended.t_vanish,
             solves: ended.solves,
             turn: ended.turn,
             excess_start: ended.start.excess,

@@ -122,6 +122,10 @@ pub struct Outcome {
     pub wulff_distance: Option<f64>,
     /// When it shrank to a point, driven by a force.
     pub t_vanish: Option<f64>,
+    /// That in the limit of many nodes and short steps, with `--refine`.
+    pub t_vanish_limit: Option<f64>,
+    /// Half-width of its 95 % interval.
+    pub t_vanish_error: Option<f64>,
     /// 4πA/L² of the last polygon, if area or length are kept.
     pub reduced_area: Option<f64>,
     /// First times of the [events](crate::Event) of the spec, in their order.
@@ -129,6 +133,9 @@ pub struct Outcome {
     /// What the [levels](crate::LevelTimes) tell of the relaxation time, if the member ran at them.
     #[serde(skip)]
     pub judged: Option<Limit>,
+    /// The same of the time at which it vanished.
+    #[serde(skip)]
+    pub judged_vanishing: Option<Limit>,
     /// The same of the times of the events, in their order.
     #[serde(skip)]
     pub judged_events: Vec<Option<Limit>>,

@@ -11,13 +11,12 @@ use crate::request::sweep::{self, Sweep};
 use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
 use curvelax_curve::Interpolation;
 
-use crate::request::drawn::Drawn;
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
     key::{HelpHeading, OmittedKeys, Spec, SpecKey},
     units::Units,
 };
-use curvelax_flow::forcing::{Conserved, Drive};
+use curvelax_flow::forcing::Conserved;
 pub use curvelax_flow::{
     number::Precision,
     solver::{Order, Solver},
@@ -209,12 +208,6 @@ impl Spec {
         self.conserve == Some(Conserved::AreaAndLength) || self.sweep.has("conserve")
     }
 
-    /// Whether a constant force drives members inwards.
-    pub(crate) fn is_driven_inwards(&self) -> bool {
-        let inwards = |drive: &Drawn<Drive>| matches!(drive.typical(), Drive::Constant(force) if *force > 0.0);
-        self.drive.as_ref().is_some_and(inwards)
-    }
-
     /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
     pub fn omega(&self) -> Omega {
         self.omega.unwrap_or(match self.pace() {
@@ -258,10 +251,9 @@ impl Spec {
         self.energy.is_some() || self.diffusivity.is_some()
     }
 
-    /// Whether relaxation times have limits n → ∞ that intervals hold: not where the end is known only when it is
-    /// reached, nor where members are followed until they vanish, whose t_vanish has none.
+    /// Whether times have limits n → ∞ that intervals hold: not where the end is known only when it is reached.
     pub fn can_refine(&self) -> bool {
-        !(self.keeps_both() || self.is_driven_inwards() || self.sweep.has("drive"))
+        !self.keeps_both()
     }
 
     /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ

@@ -50,6 +50,7 @@ struct CellDocument<'a> {
     discretisation: Numbers,
     t_limit: Numbers,
     t_vanish: Numbers,
+    t_vanish_limit: Numbers,
     /// By the names of the events.
     events: BTreeMap<&'a str, EventDocument>,
 }
@@ -207,6 +208,7 @@ impl<'a> CellDocument<'a> {
             discretisation: statistics.errors(),
             t_limit: statistics.limit(),
             t_vanish: statistics.vanished(),
+            t_vanish_limit: statistics.vanished_limit(),
             events: spec.event.iter().map(|event| &event.name[..]).zip(events).collect(),
         }
     }

@@ -112,10 +112,13 @@ pub fn place(platform: &Platform) -> String {
 
 /// When the members of a cell vanished, if any did.
 pub(super) fn vanished(spec: &Spec, cell: &CellStatistics) -> Option<String> {
-    let EventStatistics { times: of, stopped, .. } = &cell.vanishing;
+    let EventStatistics { times: of, limits, stopped, .. } = &cell.vanishing;
     match (of.sample.events(), *stopped) {
         (0, _) => None,
-        (_, 0) => Some(unit(spec) + &times(of, false, "vanished")),
+        (_, 0) => {
+            let limit = if limits.is_some() { "limit " } else { "" };
+            Some(format!("{limit}{}{}", unit(spec), times(cell.vanishing.judged(), limits.is_some(), "vanished")))
+        }
         (known, stopped) => {
             let stopped = count(stopped, "member");
             Some(format!("reached by {known}; no statistics, as {stopped} stopped when relaxed"))

@@ -178,6 +178,13 @@ impl CellStatistics {
         Numbers { known: times.sample.events(), named: named.collect(), intervals: Vec::new() }
     }
 
+    /// The numbers on the limits of these times, for the table.
+    pub fn vanished_limit(&self) -> Numbers {
+        let Numbers { known, named, .. } = self.vanishing.limit();
+        let named = named.into_iter().filter(|of| of.name.starts_with("median") || of.name == "error").collect();
+        Numbers { known, named, intervals: Vec::new() }
+    }
+
     /// The quantities in the table, with their numbers.
     fn quantities(&self) -> [(&'static str, Numbers); 4] {
         let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
@@ -369,9 +376,13 @@ impl EnsembleStatistics {
         all.extend(keys);
         all.push(column("members".into(), "integer", "members that ended".into()));
         all.extend(statuses.chain(numbers).chain(intervals));
-        all.push(column("t_vanish_known".into(), "integer", "members with a t_vanish".into()));
-        let vanished = self.cells.first().map(CellStatistics::vanished);
-        all.extend(vanished.iter().flat_map(|of| &of.named).map(|of| float("t_vanish", of)));
+        let numbers: [(&str, fn(&CellStatistics) -> Numbers); 2] =
+            [("t_vanish", CellStatistics::vanished), ("t_vanish_limit", CellStatistics::vanished_limit)];
+        for (quantity, numbers) in numbers {
+            all.push(column(format!("{quantity}_known"), "integer", format!("members with a {quantity}")));
+            let named = self.cells.first().map(|cell| numbers(cell).named);
+            all.extend(named.iter().flatten().map(|of| float(quantity, of)));
+        }
         all
     }
 
@@ -453,8 +464,7 @@ fn table<'a>(
         let values_of = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
         let numbers = quantities.each_ref().map(|(_, numbers)| (numbers.known, values_of(&numbers.named)));
         let intervals = quantities.each_ref().map(|(_, numbers)| values_of(&numbers.intervals));
-        let vanished = of.vanished();
-        let vanished = (vanished.known, values_of(&vanished.named));
+        let vanished = [of.vanished(), of.vanished_limit()].map(|of| (of.known, values_of(&of.named)));
         let row = (of.cell, values, of.members(), of.counts, numbers, intervals, vanished);
         writer.serialize(row).map_err(|e| failed(&e))?;
     }

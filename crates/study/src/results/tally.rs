@@ -89,6 +89,8 @@ pub struct MemberTime {
     pub t_relax: Option<f64>,
     /// When it vanished.
     pub t_vanish: Option<f64>,
+    /// The limit of that, and the half-width of its 95 % interval.
+    pub vanishing: Option<(f64, f64)>,
     /// Its limit.
     pub t_limit: Option<f64>,
     /// Half-width of the 95 % interval of that.
@@ -104,7 +106,8 @@ impl MemberTime {
         let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
         let events = outcome.events.iter().enumerate().map(event).collect();
         let label = outcome.label.clone();
-        MemberTime { member, cell, label, status, t_end, t_relax, t_vanish, t_limit, t_error, events }
+        let vanishing = outcome.t_vanish_limit.zip(outcome.t_vanish_error);
+        MemberTime { member, cell, label, status, t_end, t_relax, t_vanish, vanishing, t_limit, t_error, events }
     }
 
     /// The time that is shown: the limit, if there is one, with its error.
@@ -212,6 +215,10 @@ impl CellTally {
         }
         if driven {
             vanishing.times.push(Observation::new(outcome.t_vanish, outcome.t_end))?;
+            if refined {
+                vanishing.limits.push(limited(outcome.t_vanish_limit, outcome.t_vanish))?;
+            }
+            vanishing.judged.extend(outcome.judged_vanishing);
             vanishing.reached += u64::from(outcome.t_vanish.is_some());
             vanishing.stopped += u64::from(stops && outcome.status == Status::Relaxed);
         }

@@ -75,8 +75,6 @@ impl Spec {
             return Err(Error::value("drive", drive, &problem, "leave out one of the two"));
         }
         let given = format!("--drive {drive}");
-        let vanish = format!("members are followed until they vanish, with {given}, and levels have no t_vanish");
-        self.check_limits(self.is_driven_inwards(), &vanish)?;
         self.check_geometric("its steps do not see errors of the nodes", &given)
     }
 

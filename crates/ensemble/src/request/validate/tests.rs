@@ -90,10 +90,6 @@ const REFUSED: &[(&str, &str)] = &[
         "--form paper: its steps do not see errors of the nodes, and --drive 0.5 is given; use --form geometric",
     ),
     (
-        "drive = 0.5\nrefine = true",
-        "--refine true: members are followed until they vanish, with --drive 0.5, and levels have no t_vanish; use",
-    ),
-    (
         "drive = 0.5\nflow = 'willmore'\nconserve = 'length'",
         "--drive 0.5: --conserve length is given, and the scheme has no multiplier that keeps the length against a force; leave out one",
     ),

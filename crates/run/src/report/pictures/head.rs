@@ -200,7 +200,8 @@ impl FinishedRun<'_> {
         let vanished = Some(&cell.vanishing).filter(|of| of.stopped == 0 && of.times.sample.events() > 0);
         headline.extend(
             vanished
-                .map(|of| tile("median t_vanish", of.times.median(), of.times.interval().map_or(String::new(), told))),
+                .map(|of| (if of.limits.is_some() { "median t_vanish_limit" } else { "median t_vanish" }, of.judged()))
+                .map(|(name, of)| tile(name, of.median(), of.interval().map_or(String::new(), told))),
         );
         headline
     }

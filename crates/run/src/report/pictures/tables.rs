@@ -34,16 +34,17 @@ impl FinishedRun<'_> {
     fn member_table(&self) -> PageTable {
         let Spec { units, event, .. } = self.spec();
         let unit = units.as_ref().map_or(String::new(), |units| format!(" ({})", units.shown().time));
-        let header =
-            ["member", "name", "status", "t_limit", "± t_error", "t_relax", "t_vanish"].map(String::from).into_iter();
+        let times = ["t_limit", "± t_error", "t_relax", "t_vanish_limit", "± t_vanish_error", "t_vanish"];
+        let header = ["member", "name", "status"].into_iter().chain(times).map(String::from);
         let events = event.iter().map(|event| event.name.clone());
         let header = header.chain(events).enumerate().map(|(i, name)| if i > 2 { name + &unit } else { name });
         let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, MEMBER_DIGITS));
         let row = |member: &MemberTime| {
-            let MemberTime { t_limit, t_error, t_relax, t_vanish, events, .. } = member;
-            let error = t_error.map_or(String::new(), |error| significant(error, 2));
-            let times = [shown(*t_limit), error, shown(*t_relax), shown(*t_vanish)].into_iter();
-            let times = times.chain(events.iter().copied().map(shown));
+            let MemberTime { t_limit, t_error, t_relax, t_vanish, vanishing, events, .. } = member;
+            let half = |error: Option<f64>| error.map_or(String::new(), |error| significant(error, 2));
+            let times = [shown(*t_limit), half(*t_error), shown(*t_relax)].into_iter();
+            let gone = [shown(vanishing.map(|(t, _)| t)), half(vanishing.map(|(_, error)| error)), shown(*t_vanish)];
+            let times = times.chain(gone).chain(events.iter().copied().map(shown));
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
         };
@@ -215,7 +216,7 @@ impl FinishedRun<'_> {
     ) -> PageTable {
         let statuses = Status::ALL.iter().map(|status| status.name().to_string());
         let numbers = ["mean", "standard error"].into_iter().chain(QUANTILES.map(|(_, name, _)| name));
-        let raw = ["median t_error", "raw median t_relax", "median t_vanish"];
+        let raw = ["median t_error", "raw median t_relax", "median t_vanish", "median t_vanish_limit"];
         let numbers = numbers.chain(["median rate", "over theory", "discretisation %"]).chain(raw);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |(values, cell): (&[String], &CellStatistics)| {
@@ -236,8 +237,9 @@ impl FinishedRun<'_> {
             let percent = known.map(|error| 100.0 * error.mean);
             let limits = cell.limits.as_ref().filter(|_| of_limits);
             let raw = limits.and_then(|_| cell.median());
-            let errors =
-                [percent, limits.and_then(|limits| limits.error), raw, cell.vanishing.times.median()].map(shown);
+            let vanishing = &cell.vanishing;
+            let gone = [vanishing.times.median(), vanishing.limits.as_ref().and_then(|of| of.times.median())];
+            let errors = [percent, limits.and_then(|limits| limits.error), raw].into_iter().chain(gone).map(shown);
             start.chain(counts).chain(moments).chain(quantiles).chain(rates).chain(errors).collect()
         };
         PageTable {
