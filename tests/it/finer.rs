@@ -285,7 +285,8 @@ fn tables_with_a_wrong_number_of_nodes_are_refused() {
     done(home.path(), &format!("{MIXTURE} --points 64 --curves 4 --quiet --out out"));
     let summary = home.path().join("out/summary.csv");
     let text = fs::read_to_string(&summary).unwrap();
-    fs::write(&summary, text.replacen(",64,,,,\n", ",65,,,,\n", 1)).unwrap();
+    // `points` is followed by what only other members have.
+    fs::write(&summary, text.replacen(",64,,,,,,\n", ",65,,,,,,\n", 1)).unwrap();
     let output = curvelax(home.path(), "plot out");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && said.contains("column points: expected 64"), "{said}");

@@ -247,8 +247,8 @@ fn a_summary_that_is_not_whole_is_refused_with_its_place() {
         |out| replace(&summary(out), "member,cell,status", "member,cell,state"),
         "out/summary.csv, line 1, column status: expected the heading `status`, found `state`",
     );
-    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 37 fields, found 36");
-    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 37 fields, found 38");
+    refused(&done, |out| replace(&summary(out), ",self_crossing", ""), "line 1: expected 39 fields, found 38");
+    refused(&done, |out| replace(&summary(out), "\n2,0,", "\n2,0,0,"), "line 4: expected 39 fields, found 40");
     refused(
         &done,
         |out| field(&summary(out), 3, 13, "long"),

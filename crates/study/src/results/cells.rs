@@ -185,6 +185,11 @@ impl CellStatistics {
         Numbers { known, named, intervals: Vec::new() }
     }
 
+    /// The same two, with their names.
+    fn vanishing(&self) -> [(&'static str, Numbers); 2] {
+        [("t_vanish", self.vanished()), ("t_vanish_limit", self.vanished_limit())]
+    }
+
     /// The quantities in the table, with their numbers.
     fn quantities(&self) -> [(&'static str, Numbers); 4] {
         let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
@@ -366,23 +371,17 @@ impl EnsembleStatistics {
         let float = |quantity: &str, Statistic { name, meaning, .. }: &Statistic| {
             column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
         };
-        let numbers = quantities().flat_map(|(quantity, numbers)| {
+        let with_known = |(quantity, numbers): (&str, Numbers)| {
             let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
             [known].into_iter().chain(numbers.named.iter().map(|of| float(quantity, of)).collect::<Vec<_>>())
-        });
+        };
         let intervals = quantities()
             .flat_map(|(quantity, numbers)| numbers.intervals.iter().map(|of| float(quantity, of)).collect::<Vec<_>>());
         let mut all = vec![column("cell".into(), "integer", "index of the cell, from 0".into())];
         all.extend(keys);
         all.push(column("members".into(), "integer", "members that ended".into()));
-        all.extend(statuses.chain(numbers).chain(intervals));
-        let numbers: [(&str, fn(&CellStatistics) -> Numbers); 2] =
-            [("t_vanish", CellStatistics::vanished), ("t_vanish_limit", CellStatistics::vanished_limit)];
-        for (quantity, numbers) in numbers {
-            all.push(column(format!("{quantity}_known"), "integer", format!("members with a {quantity}")));
-            let named = self.cells.first().map(|cell| numbers(cell).named);
-            all.extend(named.iter().flatten().map(|of| float(quantity, of)));
-        }
+        all.extend(statuses.chain(quantities().flat_map(with_known)).chain(intervals));
+        all.extend(self.cells.first().into_iter().flat_map(CellStatistics::vanishing).flat_map(with_known));
         all
     }
 
@@ -464,7 +463,7 @@ fn table<'a>(
         let values_of = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
         let numbers = quantities.each_ref().map(|(_, numbers)| (numbers.known, values_of(&numbers.named)));
         let intervals = quantities.each_ref().map(|(_, numbers)| values_of(&numbers.intervals));
-        let vanished = [of.vanished(), of.vanished_limit()].map(|of| (of.known, values_of(&of.named)));
+        let vanished = of.vanishing().map(|(_, of)| (of.known, values_of(&of.named)));
         let row = (of.cell, values, of.members(), of.counts, numbers, intervals, vanished);
         writer.serialize(row).map_err(|e| failed(&e))?;
     }
