@@ -507,7 +507,8 @@ mod tests {
              t_relax_q05_high,t_relax_q25_low,t_relax_q25_high,t_relax_q75_low,t_relax_q75_high,t_relax_q95_low,\
              t_relax_q95_high,rate_median_coverage,rate_q05_low,rate_q05_high,rate_q25_low,rate_q25_high,rate_q75_low,\
              rate_q75_high,rate_q95_low,rate_q95_high,t_limit_median_coverage,\
-             t_vanish_known,t_vanish_median,t_vanish_median_low,t_vanish_median_high"
+             t_vanish_known,t_vanish_median,t_vanish_median_low,t_vanish_median_high,t_vanish_limit_known,\
+             t_vanish_limit_median,t_vanish_limit_median_low,t_vanish_limit_median_high,t_vanish_limit_error"
         );
         assert!(lines[1].starts_with("0,\"ellipse:2,1\",2,2,0,0,0,0,0,2,1.0,0.7071"), "{}", lines[1]);
         assert!(lines[2].starts_with("1,circle:1,2,1,1,0,0,0,0,1,1.5,0.5,"), "{}", lines[2]);
@@ -525,14 +526,14 @@ mod tests {
         // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75
         // %.
         let later = format!(
-            "{}2.0,,0{gap},0,,,0{}0.75{}2.0{}0,,,",
+            "{}2.0,,0{gap},0,,,0{}0.75{}2.0{}0,,,,0,,,,",
             ",".repeat(10),
             ",".repeat(8),
             ",".repeat(7),
             ",".repeat(12)
         );
         assert_eq!(lines[0], format!("0,1,2,0,2,0,0,0,0,0{later}"));
-        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}0,,,", ",".repeat(27)));
+        assert_eq!(lines[1], format!("1,2,0,0,0,0,0,0,0,0{gap}0{gap},0,,,0{}0,,,,0,,,,", ",".repeat(27)));
         assert!(lines[2].starts_with("2,3,1,1,0,0,0,0,0,1,0.0,,,,0.0,"), "{}", lines[2]);
     }
 }
