@@ -155,7 +155,7 @@ class Keys(TypedDict, total=False):
     false."""
 
     accuracy: float
-    """Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for sampling
+    """Choose n, the tolerance and the number of members so that the 95 % interval of the median t_limit, for sampling
     and discretisation together, is within X times the median. For outlines, whose number is given: n and the
     tolerance so that each t_error is within X times t_limit. It starts from curves, points and adaptive. If X cannot
     be reached, the run keeps its best result and exits with code 3. Needs refine. By default off."""

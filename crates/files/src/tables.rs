@@ -54,13 +54,13 @@ columns! { Outcome:
     order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
     label: word = label, "name of its outline; empty if it has none";
     group: word = group, "value of the property `--group-by` of its outline";
-    points: whole = points, "nodes of the finest level that t_limit rests on; without t_limit those of the member";
+    points: whole = points, "nodes of the finest level that t_limit, or else t_vanish_limit, rests on; without both those of the member";
     t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
     t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a tenth of its length (a crystal until it is at rest, at the latest to a quarter), and the rest is that of a circle; t_end is then a little earlier";
     reduced_area: optional = reduced_area, "with `--conserve`: 4πA/L² of the last polygon";
-    t_vanish_limit: event = t_vanish_limit, "with `--refine`: t_vanish in the limit of many nodes and short steps";
-    t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit";
+    t_vanish_limit: event = t_vanish_limit, "with `--refine`: t_vanish in the limit of many nodes and short steps; empty where the last excess is above 10⁻³, since the rest of its life is not that of a circle";
+    t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit; of an outline with what rounding does, as in t_error";
 }
 
 columns! { LevelRow:

@@ -1,4 +1,4 @@
-//! The compute pipeline, specialised for a ring, a precision and a variant.
+//! The compute pipeline, specialised for a ring, or for all of as many threads, a precision and a variant.
 
 use curvelax_backend::gpu::{
     Variant,

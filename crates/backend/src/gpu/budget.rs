@@ -27,10 +27,10 @@ impl Budget {
         if hardware {
             return Budget { steps: 1 << 20, sweeps: 1 << 24 };
         }
-        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so ten times,
+        // A sweep is one iteration. A check of the residual walks over at most all blocks; a step does so twelve times,
         // and the end of an adaptive one, which may come after any of its parts, as often again.
         let walk = blocks.count() as u32 + 1;
-        let walks = if adaptive { 20 } else { 10 };
+        let walks = if adaptive { 24 } else { 12 };
         // Before a round, which may be as short, what its equations need is computed anew. The last one may be long.
         let check = if adaptive && solver.sweeps() { 8 * walk } else { walk };
         Budget {

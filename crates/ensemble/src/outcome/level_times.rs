@@ -1,7 +1,7 @@
 //! The times of members at their [levels](super::levels): which members need more nodes, and what all of them tell.
 
 use super::levels::{LevelRow, RefinementLevel, tolerance};
-use crate::{Outcome, Spec, Variation, request::spec::Pace};
+use crate::{Outcome, Spec, Variation, request::spec::Pace, trajectory::vanishing::LITTLE_EXCESS};
 use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};
@@ -172,19 +172,23 @@ impl LevelTimes {
             ladder.limit(spec, (*own)?, finest, spec.threshold(finest.excess))
         };
         outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
-        let [relaxed, vanished] = [outcome.t_relax, outcome.t_vanish];
-        if let Some((limit, _)) = self.limit(spec, member, vanished, EndTime::Vanishing) {
-            outcome.judged_vanishing = Some(limit);
-            if spec.refine {
-                (outcome.t_vanish_limit, outcome.t_vanish_error) = (Some(limit.t), Some(limit.error));
-            }
+        // What is left of the life of one that is not round is not that of a circle.
+        let vanished = outcome.t_vanish.filter(|_| outcome.end.excess <= LITTLE_EXCESS);
+        let vanished = self.limit(spec, member, vanished, EndTime::Vanishing);
+        let relaxed = self.limit(spec, member, outcome.t_relax, EndTime::Relaxation);
+        let first = if relaxed.is_some() { EndTime::Relaxation } else { EndTime::Vanishing };
+        outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints, first);
+        (outcome.judged, outcome.judged_vanishing) = (relaxed.map(|of| of.0), vanished.map(|of| of.0));
+        if !spec.refine {
+            return;
         }
-        let Some((limit, finest)) = self.limit(spec, member, relaxed, EndTime::Relaxation) else { return };
-        outcome.judged = Some(limit);
-        outcome.t_data_error = self.moved_by(member, Variation::HalfThePoints, EndTime::Relaxation);
-        if spec.refine {
-            let Limit { t, error, order, .. } = limit;
+        if let Some(Limit { t, error, order, .. }) = outcome.judged {
             (outcome.t_limit, outcome.t_error, outcome.order) = (Some(t), Some(error), order);
+        }
+        if let Some(Limit { t, error, .. }) = outcome.judged_vanishing {
+            (outcome.t_vanish_limit, outcome.t_vanish_error) = (Some(t), Some(error));
+        }
+        if let Some((_, finest)) = relaxed.or(vanished) {
             (outcome.points, outcome.is_finer) = (finest.points(spec.points) as u64, finest.is_finer());
         }
     }

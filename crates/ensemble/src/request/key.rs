@@ -306,7 +306,7 @@ keys! {
         /// [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         refine: bool = false, "BOOL", Evolution;
-        /// Choose n, the tolerance and the number of members so that the 95 % interval of the median limit, for
+        /// Choose n, the tolerance and the number of members so that the 95 % interval of the median t_limit, for
         /// sampling and discretisation together, is within X times the median. For outlines, whose number is given: n
         /// and the tolerance so that each t_error is within X times t_limit. It starts from --curves, --points and
         /// --adaptive. If X cannot be reached, the run keeps its best result and exits with code 3. Needs --refine

@@ -10,7 +10,7 @@ mod events;
 mod outputs;
 mod settling;
 mod start;
-mod vanishing;
+pub(crate) mod vanishing;
 mod watch;
 
 use glam::DVec2;

@@ -27,7 +27,7 @@ const LEFT: f64 = 0.1;
 const CRYSTAL_LEFT: f64 = 0.25;
 /// A crystal is at rest when by theory what its shape is off has fallen by this power of e, and its excess to this.
 const AT_REST: f64 = 10.0;
-const LITTLE_EXCESS: f64 = 1e-3;
+pub(crate) const LITTLE_EXCESS: f64 = 1e-3;
 /// The next level of one that is not, over the last.
 const LOWER: f64 = 0.9;
 /// The part of the life of a curve after which steps end.

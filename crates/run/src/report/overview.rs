@@ -4,7 +4,7 @@ use std::{fmt, path::Path, time::Duration};
 
 use super::words::{
     MAX_GROUP, chi, describe, errors, events, law, machine, member_name, member_time, paired, raw, significant, times,
-    unit, vanished,
+    unit, vanished, with_error,
 };
 use curvelax_base::{
     error::shortened,
@@ -138,8 +138,10 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{:<label$}  {title:<columns$}  status", "member", "label")?;
         for ((member, name), time) in self.tally.named.iter().zip(&names).zip(&times) {
             write!(f, "{:<11}{name:<label$}  {time:<columns$}  {}", member.member, member.status.name())?;
-            if let Some(t) = member.t_vanish {
-                write!(f, " at {}", significant(t))?;
+            match (member.vanishing, member.t_vanish) {
+                (Some((limit, error)), _) => write!(f, " at the limit {}", with_error(limit, error))?,
+                (None, Some(t)) => write!(f, " at {}", significant(t))?,
+                (None, None) => {}
             }
             for (event, t) in self.spec.event.iter().zip(&member.events) {
                 write!(f, "  {} {}", event.name, t.map_or("not seen".into(), significant))?;
@@ -352,7 +354,7 @@ results    out: summary.csv, run.json
             text.lines().find(|line| line.starts_with("error")).unwrap().to_string()
         };
         let told = |tally: &Tally| of(Spec::default(), tally);
-        let driven = || Spec { drive: Some("0.5".parse().unwrap()), ..Spec::default() };
+        let vesicles = || Spec { conserve: Some("area,length".parse().unwrap()), ..Spec::default() };
         let about = "; discretisation -2 % ± 0.0098 % (estimated from 4 members)";
         let some = told(&tally);
         assert!(
@@ -361,8 +363,8 @@ results    out: summary.csv, run.json
             )),
             "{some}"
         );
-        // One that is driven inwards has no --refine.
-        let some = of(driven(), &tally);
+        // Vesicles have no --refine.
+        let some = of(vesicles(), &tally);
         assert!(
             some.ends_with(&format!("{about}; times of 1 of them do not converge yet in n: use more --points")),
             "{some}"
@@ -372,7 +374,7 @@ results    out: summary.csv, run.json
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
         assert!(told(&tally).ends_with(" dominates; add --accurate to remove it"), "{}", told(&tally));
-        let some = of(driven(), &tally);
+        let some = of(vesicles(), &tally);
         assert!(some.ends_with(" dominates; use more --points"), "{some}");
     }
 

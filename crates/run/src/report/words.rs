@@ -116,8 +116,10 @@ pub(super) fn vanished(spec: &Spec, cell: &CellStatistics) -> Option<String> {
     match (of.sample.events(), *stopped) {
         (0, _) => None,
         (_, 0) => {
-            let limit = if limits.is_some() { "limit " } else { "" };
-            Some(format!("{limit}{}{}", unit(spec), times(cell.vanishing.judged(), limits.is_some(), "vanished")))
+            let Some(limits) = limits else { return Some(unit(spec) + &times(of, false, "vanished")) };
+            // Some members may have no limit, and then count as censored at their own time.
+            let (limits, raw) = (times(&limits.times, true, "vanished and have a limit"), raw(of, spec));
+            Some(format!("limit {}{limits}; {raw}", unit(spec)))
         }
         (known, stopped) => {
             let stopped = count(stopped, "member");
@@ -179,13 +181,16 @@ pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
 /// The time of a member with its error, or until when it had not relaxed.
 pub fn member_time(member: &MemberTime) -> String {
     match member.shown() {
-        Some((t, Some(error))) => {
-            let (t, error) = beside(t, error);
-            format!("{t} ± {error}")
-        }
+        Some((t, Some(error))) => with_error(t, error),
         Some((t, None)) => significant(t),
         None => format!("> {}", significant(member.t_end)),
     }
+}
+
+/// A number and its error.
+pub(super) fn with_error(t: f64, error: f64) -> String {
+    let (t, error) = beside(t, error);
+    format!("{t} ± {error}")
 }
 
 /// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of

@@ -181,8 +181,12 @@ impl CellStatistics {
     /// The numbers on the limits of these times, for the table.
     pub fn vanished_limit(&self) -> Numbers {
         let Numbers { known, named, .. } = self.vanishing.limit();
-        let named = named.into_iter().filter(|of| of.name.starts_with("median") || of.name == "error").collect();
-        Numbers { known, named, intervals: Vec::new() }
+        let of_error = |of: Statistic| match of.name {
+            "error" => Statistic { meaning: "median of t_vanish_error", ..of },
+            _ => of,
+        };
+        let named = named.into_iter().filter(|of| of.name.starts_with("median") || of.name == "error").map(of_error);
+        Numbers { known, named: named.collect(), intervals: Vec::new() }
     }
 
     /// The same two, with their names.

@@ -147,7 +147,7 @@ pub struct FinerMembers {
 
 impl FinerMembers {
     pub(super) fn add(&mut self, outcome: &Outcome) {
-        let Some(limit) = &outcome.judged else { return };
+        let Some(limit) = outcome.judged.as_ref().or(outcome.judged_vanishing.as_ref()) else { return };
         self.judged += 1;
         self.bounds += u64::from(!limit.asymptotic);
         if outcome.is_finer {

@@ -50,8 +50,9 @@ impl FinishedRun<'_> {
         };
         match self.statistics.of_limits {
             true => format!(
-                "t_limit is the limit of t_relax for many nodes and short steps; t_relax itself is that of this run, at \
+                "t_limit is the limit of t_relax for many nodes and short steps{}; t_relax itself is that of this run, at \
                  n = {}. Times are {unit}.",
+                if self.spec().drive.is_some() { ", t_vanish_limit that of t_vanish" } else { "" },
                 self.spec().points
             ),
             false => format!("Times are {unit}."),
@@ -177,12 +178,17 @@ impl FinishedRun<'_> {
         let (time, times, unit) = (self.statistics.time(), self.statistics.times(cell), self.time_unit());
         let shown =
             |value: Option<f64>| value.map_or("not reached".into(), |t| format!("{}{unit}", significant(t, DIGITS)));
-        if times.sample.events() == 0 {
-            return vec![Headline { label: time.into(), value: "not reached".into(), note: "by any member".into() }];
-        }
         let tile =
             |label: &str, value: Option<f64>, note: String| Headline { label: label.into(), value: shown(value), note };
         let told = |interval: Interval| interval.in_short(|end| significant(end, DIGITS)) + &unit;
+        let vanished = Some(&cell.vanishing).filter(|of| of.stopped == 0 && of.times.sample.events() > 0);
+        let vanished = vanished
+            .map(|of| (if of.limits.is_some() { "median t_vanish_limit" } else { "median t_vanish" }, of.judged()))
+            .map(|(name, of)| tile(name, of.median(), of.interval().map_or(String::new(), told)));
+        if times.sample.events() == 0 {
+            let none = Headline { label: time.into(), value: "not reached".into(), note: "by any member".into() };
+            return [none].into_iter().chain(vanished).collect();
+        }
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
             Some(_) => "a lower bound: some members had not relaxed at the end".into(),
@@ -197,12 +203,7 @@ impl FinishedRun<'_> {
             headline.push(Headline { label: "nine in ten".into(), value, note: format!("{time}, 5 to 95 %") });
         }
         headline.extend(if self.statistics.of_limits { self.behind(cell) } else { discretisation(cell) });
-        let vanished = Some(&cell.vanishing).filter(|of| of.stopped == 0 && of.times.sample.events() > 0);
-        headline.extend(
-            vanished
-                .map(|of| (if of.limits.is_some() { "median t_vanish_limit" } else { "median t_vanish" }, of.judged()))
-                .map(|(name, of)| tile(name, of.median(), of.interval().map_or(String::new(), told))),
-        );
+        headline.extend(vanished);
         headline
     }
 
