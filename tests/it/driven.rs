@@ -157,6 +157,12 @@ fn when_a_member_vanishes_has_a_limit_that_its_bar_holds() {
     assert!(few.text("report.html").contains("median t_vanish_limit"));
     let levels = few.rows("levels.csv");
     assert!(levels.len() >= 18 && levels.iter().all(|row| number(row, "t_vanish") > number(row, "t_relax")));
+    // Under a strong force it is not round at the end, and has no limit.
+    let strong = run("--shape ellipse:2,1 --amplitude 0.05 --points 100 --curves 2 --accurate --drive 150");
+    for row in strong.summary() {
+        assert!(number(&row, "excess_end") > 0.01 && number(&row, "t_vanish") > 0.0, "{row:?}");
+        assert_eq!((&*row["t_vanish_limit"], &*row["t_vanish_error"]), ("", ""));
+    }
     // Tables that disagree are refused.
     let (path, told) = (few.path().join("summary.csv"), few.text("summary.csv"));
     let limit = &few.summary()[2]["t_vanish_limit"];

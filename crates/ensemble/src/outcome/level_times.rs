@@ -1,7 +1,7 @@
 //! The times of members at their [levels](super::levels): which members need more nodes, and what all of them tell.
 
 use super::levels::{LevelRow, RefinementLevel, tolerance};
-use crate::{Outcome, Spec, Variation, request::spec::Pace, trajectory::vanishing::LITTLE_EXCESS};
+use crate::{Outcome, Spec, Variation, request::spec::Pace, theory::vanishing::LITTLE_EXCESS};
 use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
 use curvelax_statistics::{Limit, Times};

@@ -13,6 +13,9 @@ use std::f64::consts::PI;
 
 use curvelax_flow::{flow::Flow, forcing::Forcing};
 
+/// Excess up to which a curve is so near its shape at rest that what is left of its life is that of this shape.
+pub(crate) const LITTLE_EXCESS: f64 = 1e-3;
+
 /// Parts into which the radius is cut, with four points each.
 const PANELS: u32 = 32;
 /// Places and weights of Gauss's rule with four points on [-1, 1].

@@ -10,7 +10,7 @@ mod events;
 mod outputs;
 mod settling;
 mod start;
-pub(crate) mod vanishing;
+mod vanishing;
 mod watch;
 
 use glam::DVec2;

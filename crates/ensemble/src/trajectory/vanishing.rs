@@ -13,7 +13,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::{Observables, theory::vanishing::vanishes_after};
+use crate::{
+    Observables,
+    theory::vanishing::{LITTLE_EXCESS, vanishes_after},
+};
 use curvelax_flow::{
     flow::Flow,
     forcing::Forcing,
@@ -25,9 +28,8 @@ use curvelax_flow::{
 /// latest. Events and snapshots until then are found.
 const LEFT: f64 = 0.1;
 const CRYSTAL_LEFT: f64 = 0.25;
-/// A crystal is at rest when by theory what its shape is off has fallen by this power of e, and its excess to this.
+/// A crystal is at rest when by theory what its shape is off has fallen by this power of e, and its excess is little.
 const AT_REST: f64 = 10.0;
-pub(crate) const LITTLE_EXCESS: f64 = 1e-3;
 /// The next level of one that is not, over the last.
 const LOWER: f64 = 0.9;
 /// The part of the life of a curve after which steps end.
