@@ -129,13 +129,15 @@ impl SpecFlags {
         if self.has("relax-to") || self.has("relax-at") {
             (spec.relax_to, spec.relax_at) = (None, None);
         }
-        if self.accurate {
-            spec.make_accurate(&self.given());
-        }
+        let accurate = self.accurate.then(|| self.given());
         spec.omitted.curves &= !self.has("curves");
         spec.omitted.amplitude &= !self.has("amplitude");
         for (key, words) in self.given {
             (key.set)(spec, &words).map_err(|problem| Error::Request(format!("--{}: {problem}", key.name)))?;
+        }
+        // Last, since it depends on what is kept.
+        if let Some(given) = accurate {
+            spec.make_accurate(&given);
         }
         Ok(())
     }

@@ -1,7 +1,8 @@
 //! The kernels as other compilers read them. A test without its compiler is reported as ignored.
 //!
 //! - Tint, in Chromium, is the second implementation of WGSL: it also proves that barriers are in uniform control flow,
-//!   which naga does not. SwiftShader, Chromium's software GPU, is the device for which it builds the pipelines.
+//!   which naga does not. It reads every kernel, and builds pipelines of some for SwiftShader, Chromium's software GPU,
+//!   whose compiler takes seconds for each.
 //! - spirv-val judges what naga makes of them for Vulkan.
 //! - ACO, AMD's compiler in Mesa, says whether their values fit into registers.
 
@@ -20,7 +21,7 @@ use std::{
     time::Duration,
 };
 
-use crate::{browser::in_browser, common::browser::headless};
+use crate::{browser::in_browser, common::browser::headless, everything};
 use curvelax::{
     backend::gpu::{Variant, shader},
     solver::{Blocks, Solver},
@@ -32,7 +33,8 @@ use serde::{Deserialize, Serialize};
 /// No page needs this long on any machine; one that does hangs.
 const HANGS: Duration = Duration::from_secs(6 * 3600);
 
-/// Builds every kernel and says on the console what becomes of it. Whatever ends the script early is said, too.
+/// Reads every kernel, builds those of which it is asked, and says on the console what becomes of each. Whatever ends
+/// the script early is said, too.
 const PAGE: &str = r#"<!doctype html><meta charset="utf-8"><script>
 const say = (name, error) => console.log("VERDICT " + JSON.stringify({ name, error }));
 onerror = (message) => say("page", message);
@@ -44,12 +46,14 @@ try {
   const requiredFeatures = adapter.features.has("subgroups") ? ["subgroups"] : [];
   const device = await adapter.requestDevice({ requiredFeatures });
   device.lost.then(({ message }) => say("page", "the device was lost: " + message));
-  for (const { name, code, constants } of kernels) {
+  for (const { name, code, constants, build } of kernels) {
     device.pushErrorScope("validation");
     const module = device.createShaderModule({ code });
     const compute = { module, entryPoint: "evolve", constants };
     let error = null;
-    await device.createComputePipelineAsync({ layout: "auto", compute }).catch((e) => { error = e.message; });
+    if (build) {
+      await device.createComputePipelineAsync({ layout: "auto", compute }).catch((e) => { error = e.message; });
+    }
     const refused = await device.popErrorScope();
     say(name, refused ? refused.message : error);
   }
@@ -62,6 +66,8 @@ struct Kernel {
     name: String,
     code: String,
     constants: BTreeMap<&'static str, f64>,
+    /// Whether its pipeline is built, too.
+    build: bool,
 }
 
 impl Kernel {
@@ -73,6 +79,8 @@ impl Kernel {
             name: format!("{variant:?}, n = {n}"),
             code: format!("{enable}{}", shader::source::<f32>(variant)),
             constants: shader::constants(shader::sizes(blocks, 32, variant.for_one_size)).into_iter().collect(),
+            // What may be wrong in the constants, and in the size of the workgroup, is the same in all of a solver.
+            build: variant == Variant { subgroup: variant.subgroup, ..Variant::of(variant.solver) },
         }
     }
 
@@ -167,12 +175,23 @@ fn spilled(folder: &Path) -> BTreeMap<String, u32> {
 fn nothing_is_spilled() {
     let folder = tempfile::tempdir().unwrap();
     kernels::write_all(100, folder.path()).unwrap();
+    if !everything() {
+        // Its compiler takes seconds for each, and adaptive steps in f32 need more registers than fixed ones.
+        for file in fs::read_dir(folder.path()).unwrap() {
+            let path = file.unwrap().path();
+            let name = path.display().to_string();
+            if !(name.contains("-adaptive") && name.contains("-f32-")) {
+                fs::remove_file(path).unwrap();
+            }
+        }
+    }
     fs::write(folder.path().join("control.spv"), kernel_of(300)).unwrap();
     let mut spilled = spilled(folder.path());
     // Negative control: more values than there are registers.
     assert!(spilled.remove("control").is_some_and(|spilled| spilled > 0));
     // Mesa 22.3 fails on some in f64.
-    assert_eq!(spilled.keys().filter(|name| name.contains("-f32-")).count(), 30, "{spilled:?}");
+    let judged = spilled.keys().filter(|name| name.contains("-f32-")).count();
+    assert_eq!(judged, if everything() { 30 } else { 15 }, "{spilled:?}");
     // In adaptive steps of crystals in f64, and in all steps of driven ones, more values are needed at once than there
     // are registers.
     let allowed = |name: &str| match name {

@@ -15,7 +15,7 @@ use curvelax::{
 const FAMILIES: u32 = 20;
 /// Seed and members of the families that every run has; with `CURVELAX_TESTS=all` they have more.
 const SEED: u64 = 411;
-const MEMBERS: u64 = 10;
+const MEMBERS: u64 = 6;
 const ALL_MEMBERS: u64 = 60;
 /// A limit may be off by so many of its half-widths.
 const WORST: f64 = 3.0;

@@ -34,11 +34,11 @@ const ELLIPSES: [(&str, [f64; 6], [f64; 6]); 4] = [
     ),
 ];
 
-/// One unperturbed 2:1 ellipse with these flags.
-fn ellipse(flags: &str, n: usize, t_end: f64, interval: f64) -> Done {
+/// One unperturbed 2:1 ellipse with these flags, and steps of this tolerance.
+fn ellipse(flags: &str, n: usize, tolerance: f64, [t_end, interval]: [f64; 2]) -> Done {
     run(&format!(
-        "{flags} --shape ellipse:2,1 --amplitude 0 --curves 1 --points {n} --adaptive=1e-5 --t-end {t_end} --series {interval} \
-         --snapshots {t_end}"
+        "{flags} --shape ellipse:2,1 --amplitude 0 --curves 1 --points {n} --adaptive={tolerance} --t-end {t_end} \
+         --series {interval} --snapshots {t_end}"
     ))
 }
 
@@ -59,8 +59,10 @@ fn worst(found: &[f64; 6], exact: &[f64; 6]) -> f64 {
 
 #[test]
 fn lengths_and_energies_of_ellipses_converge_to_those_of_a_spectral_program() {
+    // Errors of the steps are some 10⁻⁶.
+    let run = |flags: &str, n: usize| at_times(&ellipse(flags, n, 1e-4, [1.0, 0.01]));
     for (flags, lengths, energies) in ELLIPSES {
-        let runs = [50, 100, 200].map(|n| at_times(&ellipse(flags, n, 1.0, 0.01)));
+        let runs = [50, 100, 200].map(|n| run(flags, n));
         for (what, of, exact) in [("L", 0, lengths), ("E", 1, energies)] {
             let errors = runs.map(|found| worst(&found[of], &exact));
             let order = (errors[0] / errors[2]).log2() / 2.0;
@@ -74,9 +76,8 @@ fn lengths_and_energies_of_ellipses_converge_to_those_of_a_spectral_program() {
         }
     }
     // The control: another energy, and none.
-    let other = at_times(&ellipse("--energy cos:4,0.031", 100, 1.0, 0.01));
-    assert!(worst(&other[1], &ELLIPSES[2].2) > 2e-4);
-    assert!(worst(&at_times(&ellipse("--form geometric", 100, 1.0, 0.01))[0], &ELLIPSES[2].1) > 2e-3);
+    assert!(worst(&run("--energy cos:4,0.031", 100)[1], &ELLIPSES[2].2) > 2e-4);
+    assert!(worst(&run("--form geometric", 100)[0], &ELLIPSES[2].1) > 2e-3);
 }
 
 #[test]
@@ -84,7 +85,7 @@ fn an_ellipse_ends_as_the_wulff_shape_with_its_area_and_an_energy_that_never_ris
     for (text, n, bounds) in [("cos:2,0.1", [50, 100, 200], 3e-4), ("cos:4,0.03", [50, 100, 200], 3e-4)] {
         let energy: Energy = text.parse().unwrap();
         let errors = n.map(|n| {
-            let done = ellipse(&format!("--energy {text}"), n, 3.0, 0.05);
+            let done = ellipse(&format!("--energy {text}"), n, 1e-5, [3.0, 0.05]);
             let series = done.rows("series.csv");
             let energies: Vec<f64> = series.iter().map(|row| number(row, "energy")).collect();
             // At rest by less than the tolerance of the steps.
@@ -100,7 +101,7 @@ fn an_ellipse_ends_as_the_wulff_shape_with_its_area_and_an_energy_that_never_ris
         println!("{text}: {errors:.7?}, order {order:.2}");
         assert!(errors[2] < bounds && order > 1.8, "{text}: {errors:?}, order {order}");
         // The control: it is not the shape of another energy.
-        let done = ellipse(&format!("--energy {text}"), 100, 3.0, 0.5);
+        let done = ellipse(&format!("--energy {text}"), 100, 1e-5, [3.0, 0.5]);
         let other: Energy = "cos:4,0.02".parse().unwrap();
         assert!(wulff_distance(&positions(&done.rows("snapshots.csv")), &other) > 5e-3);
     }

@@ -56,8 +56,8 @@ fn truth(text: &str, curves: u64) -> Vec<f64> {
 #[test]
 fn bars_hold_the_limit_and_are_not_idle() {
     for text in PROBLEMS {
-        let members = run(Spec { refine: true, ..spec(text, 40, 100, 1e-3) });
-        let truth = truth(text, 40);
+        let members = run(Spec { refine: true, ..spec(text, 20, 100, 1e-3) });
+        let truth = truth(text, 20);
         let held = |share: f64, of: fn(&Ended) -> f64| {
             let within = |(member, truth): &(&Ended, &f64)| {
                 (of(member) - **truth).abs() <= share * member.outcome.t_error.unwrap()
@@ -66,17 +66,17 @@ fn bars_hold_the_limit_and_are_not_idle() {
         };
         let limit: fn(&Ended) -> f64 = |member| member.outcome.t_limit.unwrap();
         let own: fn(&Ended) -> f64 = |member| member.outcome.t_relax.unwrap();
-        assert!(held(1.0, limit) >= 38, "{text}: {} of 40", held(1.0, limit));
+        assert!(held(1.0, limit) >= 19, "{text}: {} of 20", held(1.0, limit));
         // The controls: bars of a thirtieth do not hold, and times without a limit are outside. The nonconvex curve
         // runs at up to 800 nodes, of which the errors are those of the truth; its bars are short in themselves.
         let is_idle = match text.contains("nonconvex") {
             true => members.iter().any(|member| member.outcome.t_error.unwrap() > 1e-3 * limit(member)),
-            false => held(1.0 / 30.0, limit) >= 38,
+            false => held(1.0 / 30.0, limit) >= 19,
         };
-        assert!(!is_idle, "{text}: {} of 40 within a thirtieth", held(1.0 / 30.0, limit));
+        assert!(!is_idle, "{text}: {} of 20 within a thirtieth", held(1.0 / 30.0, limit));
         let judged = |member: &Ended| member.outcome.judged.unwrap().asymptotic;
         let smooth = members.iter().all(judged);
-        assert!(!smooth || held(1.0, own) < 20, "{text}: {} of 40 without a limit", held(1.0, own));
+        assert!(!smooth || held(1.0, own) < 10, "{text}: {} of 20 without a limit", held(1.0, own));
     }
 }
 
@@ -254,11 +254,11 @@ fn rounds_can_be_stopped_and_members_that_relax_late_have_limits() {
     let home = TempDir::new().unwrap();
     // A name that cannot be used is told at once.
     fs::write(home.path().join("file"), "").unwrap();
-    let taken = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --out file";
+    let taken = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 64 --backend cpu --out file";
     let (code, said) = curvelax(home.path(), taken);
     assert!(code == Some(2) && said.contains("exists but is not a folder") && !said.contains("round"), "{said}");
     // After one round, many remain.
-    let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 400 --backend cpu --out long";
+    let long = "run --accurate --accuracy 1e-3 --shape nonconvex --curves 64 --backend cpu --out long";
     let (code, said) = told(&stopped_after(home.path(), long, "round 1: "));
     assert_eq!(code, Some(75), "{said}");
     assert!(said.contains("in the rounds of --accuracy") && !home.path().join("long").exists(), "{said}");

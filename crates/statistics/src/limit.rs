@@ -40,9 +40,9 @@ const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
 /// How much more exact the steps of the levels are than those of the member.
 pub const FINER_STEPS: f64 = 10.0;
-/// The error of steps: as a share of what these change, and in units of their tolerance over the root of the excess,
-/// relative to the time, since the change may be small by chance.
-const OF_STEPS: f64 = 0.15;
+/// The error of steps: as a share of what these change, for times at which an excess is reached, and in units of their
+/// tolerance over the root of the excess, relative to the time, since the change may be small by chance.
+pub const SHARE_OF_STEPS: f64 = 0.15;
 const OF_TOLERANCE: f64 = 0.0045;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;
@@ -70,8 +70,9 @@ pub struct Times {
     pub own_level: usize,
     /// Tolerance of these steps.
     pub tolerance: f64,
-    /// Whether the steps of `own` are adaptive, with a tolerance [`FINER_STEPS`] times as large.
-    pub is_adaptive: bool,
+    /// The error of the steps, as a share of by how much those of `own` change it, if these are adaptive, with a
+    /// tolerance [`FINER_STEPS`] times as large.
+    pub share_of_steps: Option<f64>,
     /// Largest angle by which the tangent of the initial curve turns at a node of the finest level, in radians.
     pub turn: f64,
     /// The excess at that time, or a smaller one.
@@ -100,14 +101,15 @@ impl Limit {
     /// Estimates the limit from the three finest levels; those below them must not have promised less.
     ///
     /// ```
-    /// use curvelax_statistics::{Limit, Times};
+    /// use curvelax_statistics::{Limit, SHARE_OF_STEPS, Times};
     ///
     /// let points = [50, 71, 100];
     /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
     /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
-    /// let (own, own_level, tolerance, is_adaptive) = (0.804, 2, 1e-4, true);
-    /// let times = Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn: 0.2, excess: 2e-3 };
-    /// let limit = Limit::of(&times);
+    /// let (own, own_level, tolerance, share_of_steps) = (0.804, 2, 1e-4, Some(SHARE_OF_STEPS));
+    /// let (turn, excess) = (0.2, 2e-3);
+    /// let limit =
+    ///     Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess });
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
     /// ```
@@ -115,7 +117,7 @@ impl Limit {
     /// # Panics
     /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
-        let Times { own, ref levels, ref points, ref rounding, own_level, tolerance, is_adaptive, turn, excess } =
+        let Times { own, ref levels, ref points, ref rounding, own_level, tolerance, share_of_steps, turn, excess } =
             *times;
         let finest = points[points.len() - 1];
         let three = |from: usize| {
@@ -130,10 +132,10 @@ impl Limit {
         let scales = std::iter::successors(Some(1.0 / fall), |scale| Some(scale / fall));
         let error = of_space.zip(scales).map(|(coarser, scale)| scale * coarser.error).fold(error, f64::max);
         let full = levels[levels.len() - 1];
-        let change = if is_adaptive { own - levels[own_level] } else { 0.0 };
+        let change = if share_of_steps.is_some() { own - levels[own_level] } else { 0.0 };
         let t = t - change / (FINER_STEPS - 1.0);
-        let error =
-            error.hypot(OF_STEPS * change).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt()).hypot(rounding);
+        let of_steps = share_of_steps.unwrap_or(0.0) * change;
+        let error = error.hypot(of_steps).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt()).hypot(rounding);
         Limit { t, error, fixed: rounding, order, asymptotic, relative: own / t - 1.0 }
     }
 
@@ -241,7 +243,17 @@ mod tests {
         let turn = turn * points[2] as f64 / points[points.len() - 1] as f64;
         let (own, points) = (levels[2], points.to_vec());
         let (rounding, tolerance, excess) = (vec![0.0; levels.len()], 1e-4, 2e-3);
-        Limit::of(&Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive: true, turn, excess })
+        Limit::of(&Times {
+            own,
+            levels,
+            points,
+            rounding,
+            own_level: 2,
+            tolerance,
+            share_of_steps: Some(SHARE_OF_STEPS),
+            turn,
+            excess,
+        })
     }
 
     /// A time whose terms fall by the square of the angle at a node of `n` nodes.
@@ -316,16 +328,18 @@ mod tests {
         assert!(limit(|h| 2.0 + 0.5 * h).needs_more(0.2));
         // Member 10 of docs/internals/method.md#limit: times that agree by chance are not enough.
         let (own, levels) = (31.82330, vec![31.81772, 31.82203, 31.82330]);
-        let (points, tolerance, excess, is_adaptive) = (vec![53, 75, 106], 1e-4, 0.012, true);
+        let (points, tolerance, excess, share_of_steps) = (vec![53, 75, 106], 1e-4, 0.012, Some(SHARE_OF_STEPS));
         let rounding = vec![0.0; 3];
-        let times = Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive, turn: 1.36, excess };
+        let times =
+            Times { own, levels, points, rounding, own_level: 2, tolerance, share_of_steps, turn: 1.36, excess };
         let chance = Limit::of(&times);
         assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.69), "{chance:?}");
         // A time that passes its largest value between levels has no order.
         let levels = vec![1.000672, 1.001219, 1.001099];
         let (points, tolerance, excess) = (vec![40, 57, 80], 1e-4, 0.012);
         let (own, rounding) = (levels[2], vec![0.0; 3]);
-        let times = Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive, turn: 0.65, excess };
+        let times =
+            Times { own, levels, points, rounding, own_level: 2, tolerance, share_of_steps, turn: 0.65, excess };
         let turned = Limit::of(&times);
         assert!(turned.order.is_none() && turned.needs_more(0.65) && !turned.asymptotic, "{turned:?}");
     }
@@ -340,8 +354,17 @@ mod tests {
     fn the_error_of_steps_goes_with_the_amplitude_at_which_they_are_judged() {
         let at = |excess: f64, tolerance: f64| {
             let (own, levels, points, rounding) = (2.0, vec![2.0; 3], POINTS.to_vec(), vec![0.0; 3]);
-            let times =
-                Times { own, levels, points, rounding, own_level: 2, tolerance, is_adaptive: true, turn: 0.1, excess };
+            let times = Times {
+                own,
+                levels,
+                points,
+                rounding,
+                own_level: 2,
+                tolerance,
+                share_of_steps: Some(SHARE_OF_STEPS),
+                turn: 0.1,
+                excess,
+            };
             Limit::of(&times).error
         };
         let (one, small, exact) = (at(1e-2, 1e-4), at(1e-4, 1e-4), at(1e-2, 1e-5));
@@ -352,14 +375,14 @@ mod tests {
     #[test]
     fn what_steps_leave_goes_with_their_tolerance_and_is_removed() {
         let levels = POINTS.map(|n| 2.001 + 50.0 / (n as f64).powi(2)).to_vec();
-        let at = |is_adaptive: bool| {
+        let at = |share_of_steps: Option<f64>| {
             let (own, levels, points, rounding) = (levels[2] + 0.009, levels.clone(), POINTS.to_vec(), vec![0.0; 3]);
             let (own_level, tolerance, turn, excess) = (2, 1e-4, 0.1, 1e-2);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess })
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
         };
-        let [adaptive, other] = [true, false].map(at);
+        let [adaptive, other] = [Some(SHARE_OF_STEPS), None].map(at);
         assert!((adaptive.t - 2.0).abs() < 1e-12 && (other.t - 2.001).abs() < 1e-12, "{adaptive:?} {other:?}");
-        assert!(adaptive.error > OF_STEPS * 0.009 && other.error < 2e-5, "{adaptive:?} {other:?}");
+        assert!(adaptive.error > SHARE_OF_STEPS * 0.009 && other.error < 2e-5, "{adaptive:?} {other:?}");
     }
 
     #[test]
@@ -368,8 +391,8 @@ mod tests {
         let at = |by: [f64; 3], rounding: f64| {
             let levels = [50, 71, 100].iter().zip(by).map(|(n, by)| exact(*n) * (1.0 + by)).collect();
             let (own, points, rounding) = (exact(100), POINTS.to_vec(), vec![rounding; 3]);
-            let (own_level, tolerance, is_adaptive, turn, excess) = (2, 1e-4, false, 0.2, 2e-3);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess })
+            let (own_level, tolerance, share_of_steps, turn, excess) = (2, 1e-4, None, 0.2, 2e-3);
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
         };
         let (moved, blind) = (at([1e-4, -1e-4, 1e-4], 1e-4), at([1e-4, -1e-4, 1e-4], 0.0));
         assert!(

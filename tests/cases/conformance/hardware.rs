@@ -9,19 +9,16 @@ const NODES: usize = 101;
 
 type Case = fn(&Gpu, Solver, usize) -> Outcome;
 
-/// The cases of an adapter.
-pub fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
+/// The cases of a precision and a solver.
+pub fn cases<T: Evolves>(index: usize, solver: Solver) -> Vec<Trial> {
     let mut compared: Vec<(&str, Case)> = vec![("the curve agrees after 1 and 100 steps", runs_agree::<T>)];
     if everything() {
         compared.push(("every stage of a step agrees", stages_agree::<T>));
         compared.push(("the curve agrees after adaptive steps", adaptive_agree::<T>));
     }
-    for solver in Solver::ALL {
-        for (what, case) in compared.clone() {
-            let name = format!("{} {} adapter {index}: by a kernel for one size {what}", T::NAME, solver.name());
-            trials.push(Trial::test(name, move || {
-                passed(case(&Gpu::list()[index].with_kernels_of_hardware(), solver, NODES))
-            }));
-        }
-    }
+    let trial = |(what, case): (&str, Case)| {
+        let name = format!("{} {} adapter {index}: by a kernel for one size {what}", T::NAME, solver.name());
+        Trial::test(name, move || passed(case(&Gpu::list()[index].with_kernels_of_hardware(), solver, NODES)))
+    };
+    compared.into_iter().map(trial).collect()
 }

@@ -8,8 +8,12 @@ mod hardware;
 mod programs;
 
 use std::{
+    collections::HashMap,
     io::Write,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Arc, LazyLock, Mutex,
+        atomic::{AtomicU64, Ordering},
+    },
 };
 
 use crate::{everything, may_lack_gpu};
@@ -43,14 +47,14 @@ use programs::{
 };
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
-/// blocks of three), and one beyond 64 threads. `tests/run` has three of them, `tests/run --all` has all. The compiler
+/// blocks of three), and one beyond 64 threads. `tests/run` has two of them, `tests/run --all` has all. The compiler
 /// takes most of the time; a kernel serves all rings of as many threads.
 const SIZES: [usize; 6] = [6, 7, 64, 99, 101, 257];
-const FEW_SIZES: [usize; 3] = [7, 64, 101];
+const FEW_SIZES: [usize; 2] = [7, 101];
 
 /// Sizes of the adaptive comparison, whose kernels take the longest to compile. Those of other forms and forces, and of
 /// events, are compared at few of them, in f32, and at one in f64: what differs with the size is in the kernels of the
-/// paper's form, too.
+/// paper's form, too. `tests/run` has other forms and forces by [two of the four kinds](has_forms).
 const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
 const FEW_ADAPTIVE_SIZES: [usize; 2] = [7, 101];
 const ONE_ADAPTIVE_SIZE: [usize; 1] = [101];
@@ -59,6 +63,12 @@ const ONE_ADAPTIVE_SIZE: [usize; 1] = [101];
 /// largest ring for eight threads; of adaptive steps at few of them.
 const ONE_SUBGROUP: [usize; 4] = [6, 7, 29, 32];
 const FEW_ONE_SUBGROUP: [usize; 2] = [7, 32];
+
+/// Whether other forms and forces are compared in a precision by a solver: in `tests/run`, each precision and each
+/// solver once. Sweeps in f32 are the kind that differs most from the others, since they refine what they solve.
+fn has_forms<T: Evolves>(solver: Solver) -> bool {
+    everything() || solver.sweeps() == (T::PRECISION == Precision::F32)
+}
 
 /// All of them, or those of a test that is to be quick.
 fn sizes(all: &'static [usize], few: &'static [usize]) -> impl Iterator<Item = usize> {
@@ -82,21 +92,30 @@ pub fn trials() -> Vec<Trial> {
     }
     for (index, gpu) in found.iter().enumerate() {
         println!("adapter {index}: {} ({}, {})", gpu.name(), gpu.device_type(), gpu.driver());
-        cases::<f32>(index, &mut trials);
-        if !gpu.is_hardware() {
-            hardware::cases::<f32>(index, &mut trials);
-        }
+        let mut kinds: Vec<Vec<Trial>> = Solver::ALL.map(|solver| cases::<f32>(index, gpu, solver)).into();
         if gpu.capacity().best_precision() == Precision::F64 {
-            cases::<f64>(index, &mut trials);
-            if !gpu.is_hardware() {
-                hardware::cases::<f64>(index, &mut trials);
-            }
+            kinds.extend(Solver::ALL.map(|solver| cases::<f64>(index, gpu, solver)));
+        }
+        // One of each kind in turn, since each kind has an adapter of its own.
+        let mut kinds: Vec<_> = kinds.into_iter().map(Vec::into_iter).collect();
+        for _ in 0..kinds.iter().map(ExactSizeIterator::len).max().unwrap_or(0) {
+            trials.extend(kinds.iter_mut().filter_map(Iterator::next));
         }
     }
     if !found.is_empty() {
         trials.push(Trial::test("the program says which kernel it compares before it compiles it", check_tells));
     }
     trials
+}
+
+/// The adapter for the cases of a precision and a solver, which share its kernels, each compiled once. The kinds do not
+/// share one adapter, since it compiles one kernel at a time.
+fn adapter<T: Evolves>(index: usize, solver: Solver) -> Arc<Gpu> {
+    type Kind = (usize, &'static str, &'static str);
+    static OPENED: LazyLock<Mutex<HashMap<Kind, Arc<Gpu>>>> = LazyLock::new(Mutex::default);
+    let mut opened = OPENED.lock().expect("no case panics while it holds the lock");
+    let kind = (index, T::NAME, solver.name());
+    opened.entry(kind).or_insert_with(|| Arc::new(Gpu::list().swap_remove(index))).clone()
 }
 
 /// Counts a case if it has passed.
@@ -119,76 +138,73 @@ pub fn record() {
     }
 }
 
-/// Few sizes are used, so that tests share kernels, which the driver keeps.
-fn cases<T: Evolves>(index: usize, trials: &mut Vec<Trial>) {
+/// Those of a precision and a solver. Few sizes are used, so that they share kernels.
+fn cases<T: Evolves>(index: usize, gpu: &Gpu, solver: Solver) -> Vec<Trial> {
+    let mut trials = Vec::new();
     let others: &'static [usize] = if T::NAME == "f32" { &FEW_ADAPTIVE_SIZES } else { &ONE_ADAPTIVE_SIZE };
-    for solver in Solver::ALL {
-        let word = solver.name();
-        let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
-            let name = format!("{} {word} adapter {index}: {name}", T::NAME);
-            trials.push(Trial::test(name, move || passed(case(&Gpu::list()[index], solver, n))));
-        };
-        for n in sizes(&SIZES, &FEW_SIZES) {
-            add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
-            add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
-        }
-        for n in sizes(&ADAPTIVE_SIZES, &FEW_ADAPTIVE_SIZES) {
-            add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
-        }
-        for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
-            add(format!("the curve agrees in the geometric form, n = {n}"), geometric_agrees::<T>, n);
-        }
-        for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
-            add(format!("crystals agree, n = {n}"), crystals_agree::<T>, n);
-        }
-        for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
-            add(format!("driven and constrained curves agree, n = {n}"), forced_agree::<T>, n);
-        }
-        if everything() {
-            add("driven crystals agree, n = 101".into(), forced_crystals_agree::<T>, 101);
-        }
+    let word = solver.name();
+    let mut add = |name: String, case: fn(&Gpu, Solver, usize) -> Outcome, n: usize| {
+        let name = format!("{} {word} adapter {index}: {name}", T::NAME);
+        trials.push(Trial::test(name, move || passed(case(&adapter::<T>(index, solver), solver, n))));
+    };
+    for n in sizes(&SIZES, &FEW_SIZES) {
+        add(format!("every stage of a step agrees, n = {n}"), stages_agree::<T>, n);
+        add(format!("the curve agrees after 1 and 100 steps, n = {n}"), runs_agree::<T>, n);
+    }
+    for n in sizes(&ADAPTIVE_SIZES, &FEW_ADAPTIVE_SIZES) {
+        add(format!("the curve agrees after adaptive steps, n = {n}"), adaptive_agree::<T>, n);
+    }
+    for n in sizes(others, &ONE_ADAPTIVE_SIZE).filter(|_| has_forms::<T>(solver)) {
+        add(format!("the curve agrees in the geometric form, n = {n}"), geometric_agrees::<T>, n);
+        add(format!("crystals agree, n = {n}"), crystals_agree::<T>, n);
+        add(format!("driven and constrained curves agree, n = {n}"), forced_agree::<T>, n);
+    }
+    if everything() {
+        add("driven crystals agree, n = 101".into(), forced_crystals_agree::<T>, 101);
+    }
+    if has_forms::<T>(solver) {
         add("another force or conserved quantity fails the comparison".into(), another_force_fails::<T>, 101);
         add("another energy or mobility fails the comparison".into(), another_crystal_fails::<T>, 101);
-        for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
-            add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
-        }
-        add("a moved node fails the comparison after adaptive steps".into(), a_moved_node_fails_adaptive::<T>, 101);
-        add(
-            "adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(),
-            adaptive_bits::<T>,
-            31,
-        );
         add(
             "adaptive: where a dispatch ends changes no bit of driven and constrained curves".into(),
             forced_bits::<T>,
             31,
         );
-        if everything() {
-            add("adaptive: a dispatch may do as much as it is allowed to".into(), adaptive_largest::<T>, 0);
-            add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
-        }
-        if T::NAME == "f32" && !solver.sweeps() {
-            add("adaptive: f32 is that of the CPU in f64".into(), f32_is_that_of_the_cpu_in_f64, 100);
-        }
-        add("adaptive: members that end badly leave the others untouched".into(), adaptive_bad_members::<T>, 101);
-        add("adaptive: the program writes the same tables on both back ends".into(), adaptive_programs_agree::<T>, 101);
-        add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 101);
-        for n in [7, 101] {
-            add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
-        }
-        add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 7);
-        add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
-        add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 64);
-        for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().kernel.shuffles) {
-            add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
-        }
-        add("members that end badly leave the others untouched".into(), bad_members::<T>, 101);
-        add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 64);
-        add("the program writes the same tables on both back ends".into(), programs_agree::<T>, 64);
-        add("a curve of any size relaxes at the same time on both back ends".into(), sizes_agree::<T>, 64);
-        add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
-        add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
     }
+    for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
+        add(format!("events are at the same times, n = {n}"), events_agree::<T>, n);
+    }
+    add("a moved node fails the comparison after adaptive steps".into(), a_moved_node_fails_adaptive::<T>, 101);
+    add("adaptive: where a dispatch ends or pauses, or a member lies, changes no bit".into(), adaptive_bits::<T>, 31);
+    if everything() {
+        add("adaptive: a dispatch may do as much as it is allowed to".into(), adaptive_largest::<T>, 0);
+        add("the largest n that fits the adapter runs".into(), largest::<T>, 0);
+    }
+    if T::NAME == "f32" && !solver.sweeps() {
+        add("adaptive: f32 is that of the CPU in f64".into(), f32_is_that_of_the_cpu_in_f64, 100);
+    }
+    add("adaptive: members that end badly leave the others untouched".into(), adaptive_bad_members::<T>, 101);
+    add("adaptive: the program writes the same tables on both back ends".into(), adaptive_programs_agree::<T>, 101);
+    add("a moved node fails the comparison of events".into(), a_moved_node_fails_events::<T>, 101);
+    for n in [7, 101] {
+        add(format!("a moved node fails both comparisons by name, n = {n}"), a_moved_node_fails::<T>, n);
+    }
+    add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 7);
+    add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
+    add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 101);
+    for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().kernel.shuffles) {
+        add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
+    }
+    add("members that end badly leave the others untouched".into(), bad_members::<T>, 101);
+    add("relaxed members stop, at the step and in the place the CPU finds".into(), relaxation::<T>, 101);
+    add("the program writes the same tables on both back ends".into(), programs_agree::<T>, 101);
+    add("a curve of any size relaxes at the same time on both back ends".into(), sizes_agree::<T>, 101);
+    add("the program refuses a ring that the adapter cannot hold".into(), program_refuses::<T>, 0);
+    add("the paper's ellipse at t = 2 is that of the CPU in f64".into(), paper::<T>, 100);
+    if !gpu.is_hardware() {
+        trials.extend(hardware::cases::<T>(index, solver));
+    }
+    trials
 }
 
 /// At most `steps` steps in a dispatch.

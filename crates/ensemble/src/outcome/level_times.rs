@@ -4,7 +4,7 @@ use super::levels::{LevelRow, RefinementLevel, tolerance};
 use crate::{Outcome, Spec, Variation, request::spec::Pace, theory::vanishing::LITTLE_EXCESS};
 use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
-use curvelax_statistics::{Limit, Times};
+use curvelax_statistics::{Limit, SHARE_OF_STEPS, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
 const OF_STEPS: f64 = 5e-5;
@@ -41,6 +41,9 @@ struct AtLevel {
 
 /// The excess that stands for the error of steps in a time at which a member vanishes.
 const OF_VANISHING: f64 = 0.01;
+/// The same where a vesicle is relaxed, and the error as a share of what steps change: the energy at rest has one, too.
+const OF_SETTLING: f64 = 1e-4;
+const SHARE_OF_SETTLING: f64 = 0.5;
 
 /// The times that end a member, each with a limit of its own.
 #[derive(Clone, Copy)]
@@ -53,11 +56,21 @@ impl EndTime {
     const ALL: [EndTime; 2] = [EndTime::Relaxation, EndTime::Vanishing];
 
     /// The excess at which a member with the curve `at` has it, on whose root the error of steps and rounding depends.
-    /// None decides when a member vanishes: there it is such that bars hold (docs/internals/method.md#limit-beyond).
+    /// None decides when a member vanishes, or a vesicle is at rest: there it is such that bars hold
+    /// (docs/internals/method.md#limit-beyond).
     fn excess(self, spec: &Spec, at: &AtLevel) -> f64 {
         match self {
+            EndTime::Relaxation if spec.keeps_both() => OF_SETTLING,
             EndTime::Relaxation => spec.threshold(at.excess),
             EndTime::Vanishing => OF_VANISHING,
+        }
+    }
+
+    /// The error that adaptive steps leave, as a share of what they change.
+    fn share_of_steps(self, spec: &Spec) -> f64 {
+        match self {
+            EndTime::Relaxation if spec.keeps_both() => SHARE_OF_SETTLING,
+            _ => SHARE_OF_STEPS,
         }
     }
 }
@@ -84,9 +97,9 @@ impl Ladder {
         Ladder { levels, times, precisions }
     }
 
-    /// What it tells of the time `own` at the nodes of `spec`, at which the excess is `excess`, with the curve at its
-    /// finest level; nothing if it is too short, does not have these nodes, or the time is 0.
-    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, excess: f64) -> Option<Limit> {
+    /// What it tells of the time `own` at the nodes of `spec`, judged as `of`, with the curve at its finest level;
+    /// nothing if it is too short, does not have these nodes, or the time is 0.
+    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         // What holds at the start has no time to judge.
@@ -94,8 +107,9 @@ impl Ladder {
             return None;
         }
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
-        let is_adaptive = matches!(spec.pace(), Pace::Adaptive(_));
+        let share_of_steps = matches!(spec.pace(), Pace::Adaptive(_)).then(|| of.share_of_steps(spec));
         let turn = turn(spec, finest);
+        let excess = of.excess(spec, finest);
         // The error of the steps is relative to the root of the excess, and a circle has none.
         if excess <= 0.0 {
             return None;
@@ -105,7 +119,7 @@ impl Ladder {
         let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
         let levels = times;
-        Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, is_adaptive, turn, excess }))
+        Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess }))
     }
 }
 
@@ -157,7 +171,7 @@ impl LevelTimes {
             let own = self.time(of, RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0);
             let Some((own, _)) = own.filter(|_| !ladder.levels.is_empty()) else { return false };
             // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
-            let limit = ladder.limit(spec, own, finest, of.excess(spec, finest));
+            let limit = ladder.limit(spec, own, finest, of);
             limit.is_none_or(|limit| limit.needs_more(turn(spec, finest)))
         })
     }
@@ -169,7 +183,7 @@ impl LevelTimes {
         let of_event = |(place, own): (usize, &Option<f64>)| {
             let ladder = self.ladder(|level| self.event_time(level, member, [place, count]));
             let finest = self.at(*ladder.levels.last()?, member)?;
-            ladder.limit(spec, (*own)?, finest, spec.threshold(finest.excess))
+            ladder.limit(spec, (*own)?, finest, EndTime::Relaxation)
         };
         outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
         // What is left of the life of one that is not round is not that of a circle.
@@ -199,7 +213,7 @@ impl LevelTimes {
         let ladder = self.ladder(|level| self.time(of, level, member));
         let level = *ladder.levels.last()?;
         let finest = self.at(level, member)?;
-        let mut limit = ladder.limit(spec, own?, finest, of.excess(spec, finest))?;
+        let mut limit = ladder.limit(spec, own?, finest, of)?;
         let by_radius = self.moved_by(member, Variation::TwiceTheRadius, of).unwrap_or_default();
         limit.fixed += by_radius;
         limit.error += by_radius;

@@ -60,7 +60,7 @@ impl Spec {
         if is_free("t-end") {
             self.t_end = Some(FinalTime::Auto);
         }
-        if is_free("stop-when-relaxed") {
+        if is_free("stop-when-relaxed") && !self.keeps_both() {
             self.stop_when_relaxed = Some(true);
         }
         self.refine |= is_free("refine");
@@ -251,16 +251,11 @@ impl Spec {
         self.energy.is_some() || self.diffusivity.is_some()
     }
 
-    /// Whether times have limits n → ∞ that intervals hold: not where the end is known only when it is reached.
-    pub fn can_refine(&self) -> bool {
-        !self.keeps_both()
-    }
-
     /// How many times smaller than elsewhere the turn at a node must be to resolve a curve. The phase of a wave of γ
     /// and M turns m times as fast as the tangent, and that of the highest one must be resolved, too; where the length
     /// is kept, it is measured.
     pub(crate) fn turns(&self) -> f64 {
-        if self.conserve == Some(Conserved::Length) {
+        if self.conserve.is_some_and(Conserved::keeps_length) {
             return LENGTH_TURNS;
         }
         self.highest_wave().unwrap_or(1).max(1).into()

@@ -297,11 +297,7 @@ mod tests {
     use curvelax_study::samples::{outcome, platform};
 
     fn overview(tally: &Tally) -> String {
-        overview_of(Spec::default(), tally)
-    }
-
-    fn overview_of(spec: Spec, tally: &Tally) -> String {
-        let (platform, mut tally) = (platform(), tally.clone());
+        let (spec, platform, mut tally) = (Spec::default(), platform(), tally.clone());
         let wall = Duration::from_millis(12_345);
         let files = &[names::SUMMARY, names::RUN];
         let statistics = &EnsembleStatistics::new(&spec, &mut tally).unwrap();
@@ -349,12 +345,10 @@ results    out: summary.csv, run.json
             let judged = (member < 4).then_some(judged);
             tally.add(&Outcome { judged, ..outcome(member, Status::Relaxed, Some(t)) }).unwrap();
         }
-        let of = |spec: Spec, tally: &Tally| {
-            let text = overview_of(spec, tally);
+        let told = |tally: &Tally| {
+            let text = overview(tally);
             text.lines().find(|line| line.starts_with("error")).unwrap().to_string()
         };
-        let told = |tally: &Tally| of(Spec::default(), tally);
-        let vesicles = || Spec { conserve: Some("area,length".parse().unwrap()), ..Spec::default() };
         let about = "; discretisation -2 % ± 0.0098 % (estimated from 4 members)";
         let some = told(&tally);
         assert!(
@@ -363,19 +357,11 @@ results    out: summary.csv, run.json
             )),
             "{some}"
         );
-        // Vesicles have no --refine.
-        let some = of(vesicles(), &tally);
-        assert!(
-            some.ends_with(&format!("{about}; times of 1 of them do not converge yet in n: use more --points")),
-            "{some}"
-        );
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.asymptotic = true);
         // Sampling is the larger one here.
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
         tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
         assert!(told(&tally).ends_with(" dominates; add --accurate to remove it"), "{}", told(&tally));
-        let some = of(vesicles(), &tally);
-        assert!(some.ends_with(" dominates; use more --points"), "{some}");
     }
 
     #[test]

@@ -250,11 +250,7 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
-    let remedy = match (spec.refine, spec.can_refine()) {
-        (true, _) => "t_error bounds them",
-        (false, true) => "use --refine, or more --points",
-        (false, false) => "use more --points",
-    };
+    let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
     let bound = cell.limits.as_ref().and_then(|limits| limits.error);
     if let (false, Some(bound)) = (discretisation.converges(), bound) {
         return format!(
@@ -277,7 +273,6 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
             format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
         () if spec.refine => ": t_limit is free of it".into(),
-        () if larger && !spec.can_refine() => " dominates; use more --points".into(),
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => " dominates; add --refine to remove it".into(),
         () if larger => " dominates; add --accurate to remove it".into(),
         () => String::new(),

@@ -53,14 +53,6 @@ impl Spec {
         }
     }
 
-    /// Refuses limits for the reason `why`.
-    fn check_limits(&self, has_none: bool, why: &str) -> Result<()> {
-        match self.refine && has_none {
-            true => Err(Error::value("refine", true, why, "use --refine=false, and compare --points by a sweep")),
-            false => Ok(()),
-        }
-    }
-
     /// Refuses what a driven flow does not have.
     pub(super) fn check_forcing(&self) -> Result<()> {
         self.check_conserved()?;
@@ -95,9 +87,6 @@ impl Spec {
             return refused("surface diffusion keeps the area anyway, and could not keep the length", allowed);
         }
         let given = format!("--conserve {conserved}");
-        let late =
-            format!("the end is known only when it is reached, with {given}: intervals were found to miss times");
-        self.check_limits(conserved == Conserved::AreaAndLength, &late)?;
         self.check_geometric("it would not keep anything exactly", &given)?;
         if conserved == Conserved::AreaAndLength {
             if let Some(excess) = self.relax_at {
