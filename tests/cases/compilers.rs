@@ -80,7 +80,7 @@ impl Kernel {
             code: format!("{enable}{}", shader::source::<f32>(variant)),
             constants: shader::constants(shader::sizes(blocks, 32, variant.for_one_size)).into_iter().collect(),
             // What may be wrong in the constants, and in the size of the workgroup, is the same in all of a solver.
-            build: variant == Variant { subgroup: variant.subgroup, ..Variant::of(variant.solver) },
+            build: everything() || variant == Variant { subgroup: variant.subgroup, ..Variant::of(variant.solver) },
         }
     }
 

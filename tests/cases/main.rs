@@ -31,7 +31,7 @@ fn may_lack_gpu() -> bool {
 fn main() -> ExitCode {
     let mut arguments = Arguments::from_args();
     // Many trials wait: for a program, a compiler, or the two minutes after which a GPU is given up. These are first,
-    // that with the slowest compiler before all: alone at the end it would take five minutes of one processor.
+    // those with compilers of one thread before all, since others then run beside them.
     arguments.test_threads.get_or_insert(2 + available_parallelism().map_or(1, usize::from));
     type Trials = fn() -> Vec<Trial>;
     let modules: [(&str, Trials); 9] = [

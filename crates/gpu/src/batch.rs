@@ -241,7 +241,8 @@ impl Reading {
             }
         }
         let failed = |what: String| device.error(&what);
-        match self.mapped.try_recv() {
+        // Another thread that waits for this device may have taken the news, and be about to pass it on.
+        match self.mapped.recv_timeout(left(since).max(Duration::from_secs(1))) {
             Ok(Ok(())) => {}
             other => return Err(failed(format!("results could not be read back ({other:?})"))),
         }

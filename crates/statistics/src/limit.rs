@@ -40,9 +40,10 @@ const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
 /// How much more exact the steps of the levels are than those of the member.
 pub const FINER_STEPS: f64 = 10.0;
-/// The error of steps: as a share of what these change, for times at which an excess is reached, and in units of their
-/// tolerance over the root of the excess, relative to the time, since the change may be small by chance.
+/// The error of steps as a share of what these change, for times at which an excess is reached.
 pub const SHARE_OF_STEPS: f64 = 0.15;
+/// The same in units of their tolerance over the root of the excess, relative to the time, since the change may be
+/// small by chance.
 const OF_TOLERANCE: f64 = 0.0045;
 /// Orders that are looked for.
 const ALL_ORDERS: std::ops::Range<f64> = 0.05..8.0;

@@ -251,6 +251,10 @@ fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
             return Err(Error::value("tolerance", tolerance, problem, &allowed));
         }
     }
+    if precision == Precision::F32 && spec.refine && spec.keeps_both() {
+        let problem = "with --conserve area,length the energy at rest is rounded by more than --refine is to find";
+        return Err(Error::value("precision", "f32", problem, "use --precision f64, or --backend cpu"));
+    }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
         return Err(Error::value("points", n, &problem, "use fewer points, or --precision f64"));

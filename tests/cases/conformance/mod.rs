@@ -65,9 +65,11 @@ const ONE_SUBGROUP: [usize; 4] = [6, 7, 29, 32];
 const FEW_ONE_SUBGROUP: [usize; 2] = [7, 32];
 
 /// Whether other forms and forces are compared in a precision by a solver: in `tests/run`, each precision and each
-/// solver once. Sweeps in f32 are the kind that differs most from the others, since they refine what they solve.
+/// solver once. Sweeps in f32 are the kind that differs most from the others, since they refine what they solve. A
+/// second driver has all kinds at few sizes.
 fn has_forms<T: Evolves>(solver: Solver) -> bool {
-    everything() || solver.sweeps() == (T::PRECISION == Precision::F32)
+    let all_forms = std::env::var("CURVELAX_TESTS").is_ok_and(|value| value == "forms");
+    everything() || all_forms || solver.sweeps() == (T::PRECISION == Precision::F32)
 }
 
 /// All of them, or those of a test that is to be quick.

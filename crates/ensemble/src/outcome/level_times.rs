@@ -60,7 +60,7 @@ impl EndTime {
     /// (docs/internals/method.md#limit-beyond).
     fn excess(self, spec: &Spec, at: &AtLevel) -> f64 {
         match self {
-            EndTime::Relaxation if spec.keeps_both() => OF_SETTLING,
+            EndTime::Relaxation if spec.keeps_both() => OF_SETTLING.min(at.excess),
             EndTime::Relaxation => spec.threshold(at.excess),
             EndTime::Vanishing => OF_VANISHING,
         }

@@ -7,7 +7,7 @@ use std::fmt;
 
 use serde::Deserialize;
 
-use crate::request::sweep::{self, Sweep};
+use crate::request::sweep::{self, Sweep, SweepAxis};
 use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
 use curvelax_curve::Interpolation;
 
@@ -60,7 +60,8 @@ impl Spec {
         if is_free("t-end") {
             self.t_end = Some(FinalTime::Auto);
         }
-        if is_free("stop-when-relaxed") && !self.keeps_both() {
+        // The end of a vesicle is known only when it is reached.
+        if is_free("stop-when-relaxed") && !self.has_vesicles() {
             self.stop_when_relaxed = Some(true);
         }
         self.refine |= is_free("refine");
@@ -201,6 +202,13 @@ impl Spec {
     /// Whether a member ends when it is relaxed; one that is driven to a point ends there.
     pub fn stops_when_relaxed(&self) -> bool {
         self.stop_when_relaxed.unwrap_or(self.t_end == Some(FinalTime::Auto) && !self.keeps_both())
+    }
+
+    /// Whether both area and length are kept, in any cell.
+    fn has_vesicles(&self) -> bool {
+        let both = Conserved::AreaAndLength;
+        let swept = self.sweep.axes().iter().filter(|axis| axis.key == "conserve").flat_map(SweepAxis::labels);
+        self.conserve == Some(both) || swept.into_iter().any(|value| value.parse() == Ok(both))
     }
 
     /// Whether both area and length are kept, so that the end is no circle, and known only when it is reached.

@@ -53,8 +53,8 @@ impl Settling {
     }
 }
 
-/// When a number first falls to `share`, of its `values` at times: by the cubic through the logarithms of four values,
-/// or as an exponential where these do not fall all the way.
+/// When a number first falls to `share`, of its `values` at times: the time is a cubic in the logarithms of four
+/// values, or linear in it where these do not fall all the way, or in the value where it reaches 0.
 fn falls_to(share: f64, values: &[[f64; 2]]) -> Option<f64> {
     let after = (1..values.len()).find(|i| values[*i][1] <= share)?;
     let [[t, above], [later, below]] = [values[after - 1], values[after]];

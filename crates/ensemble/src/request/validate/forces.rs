@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::request::{
-    spec::{PositionForm, Spec},
+    spec::{Pace, PositionForm, Spec},
     values::check_reduced_area,
 };
 use curvelax_base::{
@@ -89,6 +89,10 @@ impl Spec {
         let given = format!("--conserve {conserved}");
         self.check_geometric("it would not keep anything exactly", &given)?;
         if conserved == Conserved::AreaAndLength {
+            if let (true, Pace::Fixed(_)) = (self.refine, self.pace()) {
+                let problem = format!("what fixed steps leave in the energy at rest is not known, with {given}");
+                return Err(Error::value("refine", true, &problem, "use --adaptive, or --accurate"));
+            }
             if let Some(excess) = self.relax_at {
                 let problem = "with area and length the excess stays as it is";
                 return Err(Error::value("relax-at", number(excess), problem, "use --relax-to, a share of the energy"));

@@ -100,6 +100,10 @@ const REFUSED: &[(&str, &str)] = &[
         "--form paper: it would not keep anything exactly, and --conserve area is given; use --form geometric",
     ),
     (
+        "conserve = 'area,length'\nflow = 'willmore'\nrefine = true\ntau = 1e-3",
+        "--refine true: what fixed steps leave in the energy at rest is not known, with --conserve area,length; use --adaptive",
+    ),
+    (
         "conserve = 'area,length'\nflow = 'willmore'\nrelax-at = 0.1",
         "--relax-at 0.1: with area and length the excess stays as it is; use --relax-to",
     ),
@@ -209,7 +213,7 @@ const ACCEPTED: &[&str] = &[
     "drive = -0.5\nenergy = 'cos:3,0.05'\nrefine = true",
     "drive = 'feedback:1,3'\nrefine = true",
     "conserve = 'length'\nflow = 'willmore'\nrefine = true",
-    "conserve = 'area,length'\nflow = 'willmore'\nrefine = true",
+    "conserve = 'area,length'\nflow = 'willmore'\nrefine = true\nadaptive = 1e-3",
     "drive = 'feedback:uniform(1..2),3'\nflow = 'willmore'",
     "conserve = 'area'\nflow = 'elastic:0.5'\nconserve-at = [3]\nform = 'geometric'",
     "conserve = 'area,length'\nflow = 'poly:0.5'\nreduced-area = 'uniform(0.5..0.9)'\nt-end = 'auto'",
