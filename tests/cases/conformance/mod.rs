@@ -6,14 +6,11 @@
 mod forces;
 mod hardware;
 mod programs;
+mod shared;
 
 use std::{
-    collections::HashMap,
     io::Write,
-    sync::{
-        Arc, LazyLock, Mutex,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::atomic::{AtomicU64, Ordering},
 };
 
 use crate::{everything, may_lack_gpu};
@@ -45,6 +42,7 @@ use libtest_mimic::{Failed, Trial};
 use programs::{
     adaptive_programs_agree, check_tells, f32_is_that_of_the_cpu_in_f64, program_refuses, programs_agree, sizes_agree,
 };
+use shared::adapter;
 
 /// The sizes: the two smallest, a power of two, divisible by 3, by 4, a prime, every remainder modulo 4 (the number of
 /// blocks of three), and one beyond 64 threads. `tests/run` has two of them, `tests/run --all` has all. The compiler
@@ -108,16 +106,6 @@ pub fn trials() -> Vec<Trial> {
         trials.push(Trial::test("the program says which kernel it compares before it compiles it", check_tells));
     }
     trials
-}
-
-/// The adapter for the cases of a precision and a solver, which share its kernels, each compiled once. The kinds do not
-/// share one adapter, since it compiles one kernel at a time.
-fn adapter<T: Evolves>(index: usize, solver: Solver) -> Arc<Gpu> {
-    type Kind = (usize, &'static str, &'static str);
-    static OPENED: LazyLock<Mutex<HashMap<Kind, Arc<Gpu>>>> = LazyLock::new(Mutex::default);
-    let mut opened = OPENED.lock().expect("no case panics while it holds the lock");
-    let kind = (index, T::NAME, solver.name());
-    opened.entry(kind).or_insert_with(|| Arc::new(Gpu::list().swap_remove(index))).clone()
 }
 
 /// Counts a case if it has passed.
