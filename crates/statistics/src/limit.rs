@@ -244,17 +244,8 @@ mod tests {
         let turn = turn * points[2] as f64 / points[points.len() - 1] as f64;
         let (own, points) = (levels[2], points.to_vec());
         let (rounding, tolerance, excess) = (vec![0.0; levels.len()], 1e-4, 2e-3);
-        Limit::of(&Times {
-            own,
-            levels,
-            points,
-            rounding,
-            own_level: 2,
-            tolerance,
-            share_of_steps: Some(SHARE_OF_STEPS),
-            turn,
-            excess,
-        })
+        let (own_level, share_of_steps) = (2, Some(SHARE_OF_STEPS));
+        Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
     }
 
     /// A time whose terms fall by the square of the angle at a node of `n` nodes.
@@ -355,18 +346,9 @@ mod tests {
     fn the_error_of_steps_goes_with_the_amplitude_at_which_they_are_judged() {
         let at = |excess: f64, tolerance: f64| {
             let (own, levels, points, rounding) = (2.0, vec![2.0; 3], POINTS.to_vec(), vec![0.0; 3]);
-            let times = Times {
-                own,
-                levels,
-                points,
-                rounding,
-                own_level: 2,
-                tolerance,
-                share_of_steps: Some(SHARE_OF_STEPS),
-                turn: 0.1,
-                excess,
-            };
-            Limit::of(&times).error
+            let (own_level, share_of_steps, turn) = (2, Some(SHARE_OF_STEPS), 0.1);
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+                .error
         };
         let (one, small, exact) = (at(1e-2, 1e-4), at(1e-4, 1e-4), at(1e-2, 1e-5));
         // Equal times leave the rounding of their extrapolation, some 1e-16.
