@@ -101,7 +101,8 @@ class Keys(TypedDict, total=False):
 
     conserve: str
     """Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-    vesicle: it is relaxed when relax-to of the way of its energy is left. By default neither."""
+    vesicle: it is relaxed when its energy stays within relax-to of its largest distance from its end. By default
+    neither."""
 
     conserve_at: Sequence[float]
     """The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are scaled
@@ -141,12 +142,13 @@ class Keys(TypedDict, total=False):
     Use it for rough outlines. By default off."""
 
     stop_when_relaxed: bool
-    """End a member as soon as it is relaxed; one that drive shrinks to a point ends there. By default false; with
-    t-end auto true."""
+    """End a member as soon as it is relaxed; one that drive shrinks to a point ends there. Vesicles (conserve
+    area,length) run to the final time. By default false; with t-end auto true."""
 
     accurate: bool
-    """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine.
-    Each can still be set on its own. By default off."""
+    """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine;
+    vesicles (conserve area,length) run without stop-when-relaxed. Each can still be set on its own. By default
+    off."""
 
     refine: bool
     """Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n →

@@ -64,7 +64,7 @@ impl clap::Args for SpecFlags {
         let accurate =
             Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(HelpHeading::Evolution.name());
         let accurate = accurate.help(
-            "What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine. Each can still be set on its own [default: off]",
+            "What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine; vesicles (--conserve area,length) run without --stop-when-relaxed. Each can still be set on its own [default: off]",
         );
         Spec::KEYS.iter().fold(command, |command, key| {
             let command = if key.name == AFTER_ACCURATE { command.arg(accurate.clone()) } else { command };

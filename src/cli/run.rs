@@ -57,7 +57,8 @@ pub struct RunArgs {
     resume: bool,
     #[command(flatten)]
     options: ReportFlags,
-    /// Predict memory, disk space, steps and time of the run from a pilot of some two seconds of work, and stop
+    /// Predict memory, disk space, steps and time of the run from a pilot of some two seconds of work, and stop. With
+    /// --accuracy its rounds come first, since they choose what is run
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop

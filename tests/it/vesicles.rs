@@ -239,3 +239,20 @@ fn area_and_length_can_be_given() {
     let (row, _) = ellipse("2,1", "--conserve area --conserve-at 6.5 --t-end 0.5", 60);
     assert!((number(&row, "area_end") / 6.5 - 1.0).abs() < 1e-9, "{}", row["area_end"]);
 }
+
+/// Half the bending energy is no energy of this flow: it falls below its end at once, and comes back slowly.
+#[test]
+fn a_vesicle_is_relaxed_when_its_energy_stays_near_its_end() {
+    let flags = "--flow poly:0,0,0,1 --conserve area,length --shape ellipse:2,1 --amplitude 0 --curves 1 --points 64 \
+                 --adaptive --pull auto --series 0.005";
+    let done = run(flags);
+    let (row, series) = (done.summary().remove(0), done.rows("series.csv"));
+    let (t_relax, end) = (number(&row, "t_relax"), number(&row, "energy_end"));
+    let off: Vec<[f64; 2]> = series.iter().map(|at| [number(at, "t"), number(at, "energy") - end]).collect();
+    let farthest = off.iter().map(|[_, off]| off.abs()).fold(0.0, f64::max);
+    let last = off.iter().rfind(|[_, off]| off.abs() > 0.01 * farthest).map(|[t, _]| *t).unwrap();
+    assert!((last..last + 0.006).contains(&t_relax), "{t_relax}, near its end from {last} on");
+    // The first time at which it was as near is much earlier.
+    let passes = off.iter().find(|[_, off]| *off < 0.0).map(|[t, _]| *t).unwrap();
+    assert!(passes < 0.2 * t_relax, "{passes}");
+}

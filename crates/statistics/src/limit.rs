@@ -140,6 +140,9 @@ impl Limit {
         Limit { t, error, fixed: rounding, order, asymptotic, relative: own / t - 1.0 }
     }
 
+    /// The limit of what holds at the start with any number of nodes.
+    pub const AT_START: Limit = Limit { t: 0.0, error: 0.0, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
+
     /// Whether its differences do not fall as they should, and it is not known to a thousandth.
     pub fn is_open(&self) -> bool {
         !self.asymptotic && self.error - self.fixed > WIDE * self.t
@@ -155,7 +158,17 @@ impl Limit {
 
     /// Its half-width relative to the limit.
     pub fn relative_error(&self) -> f64 {
-        self.error / self.t
+        self.relative_to_limit(self.error)
+    }
+
+    /// The part of it that no nodes or steps lessen.
+    pub fn relative_fixed(&self) -> f64 {
+        self.relative_to_limit(self.fixed)
+    }
+
+    /// Nothing is nothing beside a limit of 0, too.
+    fn relative_to_limit(&self, part: f64) -> f64 {
+        if part == 0.0 { 0.0 } else { part / self.t }
     }
 }
 

@@ -253,7 +253,9 @@ fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
     }
     if precision == Precision::F32 && spec.refine && spec.keeps_both() {
         let problem = "with --conserve area,length the energy at rest is rounded by more than --refine is to find";
-        return Err(Error::value("precision", "f32", problem, "use --precision f64, or --backend cpu"));
+        // The CPU has f32 if it is asked for.
+        let cpu = if spec.precision.is_some() { "" } else { ", or --backend cpu" };
+        return Err(Error::value("precision", "f32", problem, &format!("use --precision f64{cpu}")));
     }
     if precision == Precision::F32 && n > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");

@@ -102,8 +102,14 @@ impl Ladder {
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
+        if levels.len() < RefinementLevel::FIRST.len() {
+            return None;
+        }
         // What holds at the start has no time to judge.
-        if levels.len() < RefinementLevel::FIRST.len() || !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
+        if times.iter().chain([&own]).all(|t| *t == 0.0) {
+            return Some(Limit::AT_START);
+        }
+        if !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
             return None;
         }
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
@@ -302,6 +308,25 @@ mod tests {
             times.add(&LevelRow { level, turn, t_relax, excess_start: 0.2, ..LevelRow::default() }).unwrap();
         }
         times.needs(&spec, 0, RefinementLevel::of_number(4).unwrap())
+    }
+
+    #[test]
+    fn what_holds_at_the_start_has_the_limit_0() {
+        let spec = Spec::from_toml("adaptive = 1e-3\nrefine = true").unwrap();
+        let judged = |at_levels: [f64; 3]| {
+            let mut times = LevelTimes::default();
+            for (level, t) in RefinementLevel::FIRST.into_iter().zip(at_levels) {
+                let row =
+                    LevelRow { level: level.number(), t_relax: Some(t), excess_start: 0.2, ..LevelRow::default() };
+                times.add(&LevelRow { events: vec![Some(t)], ..row }).unwrap();
+            }
+            let mut own = Outcome { t_relax: Some(0.0), events: vec![Some(0.0)], ..Outcome::default() };
+            times.judge(&spec, &mut own);
+            (own.t_limit.zip(own.t_error), own.limit_of_event(0).map(|limit| limit.relative_error()))
+        };
+        assert_eq!(judged([0.0; 3]), (Some((0.0, 0.0)), Some(0.0)));
+        // With fewer nodes it does not hold.
+        assert_eq!(judged([0.1, 0.0, 0.0]), (None, None));
     }
 
     #[test]

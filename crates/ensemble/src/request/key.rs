@@ -225,7 +225,8 @@ keys! {
         #[serde(skip_serializing_if = "Option::is_none")]
         drive: Option<Drawn<Drive>> = None, "F", Evolution;
         /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-        /// vesicle: it is relaxed when --relax-to of the way of its energy is left [default: neither]
+        /// vesicle: it is relaxed when its energy stays within --relax-to of its largest distance from its end
+        /// [default: neither]
         #[serde(skip_serializing_if = "Option::is_none")]
         conserve: Option<Conserved> = None, "WHAT", Evolution;
         /// The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are
@@ -296,8 +297,8 @@ keys! {
         /// --relax-to. Use it for rough outlines [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_at: Option<f64> = None, "EXCESS", Evolution;
-        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there [default: false; with
-        /// --t-end auto true]
+        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there. Vesicles (--conserve
+        /// area,length) run to the final time [default: false; with --t-end auto true]
         #[serde(skip_serializing_if = "Option::is_none")]
         stop_when_relaxed: Option<bool> = None, "BOOL", Evolution;
         /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n

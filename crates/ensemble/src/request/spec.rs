@@ -211,6 +211,12 @@ impl Spec {
         self.conserve == Some(both) || swept.into_iter().any(|value| value.parse() == Ok(both))
     }
 
+    /// Whether both are kept in cell `index` of the sweep: when such a member is relaxed is known only at its end.
+    pub fn has_vesicles_in(&self, index: u64) -> bool {
+        let of_cell = self.sweep.axes().iter().zip(self.sweep.values(index)).find(|(axis, _)| axis.key == "conserve");
+        of_cell.map_or(self.conserve, |(_, value)| sweep::label(value).parse().ok()) == Some(Conserved::AreaAndLength)
+    }
+
     /// Whether both area and length are kept, so that the end is no circle, and known only when it is reached.
     pub fn keeps_both(&self) -> bool {
         self.conserve == Some(Conserved::AreaAndLength) || self.sweep.has("conserve")

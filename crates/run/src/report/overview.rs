@@ -18,6 +18,7 @@ use curvelax_study::{
         cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Rates},
         shortfall::Shortfall,
         tally::Tally,
+        times::TimeStatistics,
     },
 };
 
@@ -103,9 +104,13 @@ impl Overview<'_> {
 
     fn relaxation(&self) -> String {
         let unit = unit(self.spec);
-        self.only_cell().map_or(String::new(), |cell| {
-            unit + &times(self.statistics.times(cell), self.statistics.of_limits, "relaxed")
-        })
+        self.only_cell()
+            .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.limits_of(cell), "relaxed"))
+    }
+
+    /// The times of a cell of which limits are shown, if they are.
+    fn limits_of<'b>(&self, cell: &'b CellStatistics) -> Option<&'b TimeStatistics> {
+        Some(&cell.times).filter(|_| self.statistics.of_limits)
     }
 
     /// When the members of a single ensemble vanished, if any did.
@@ -187,7 +192,7 @@ impl Overview<'_> {
         }
         for cell in cells.iter().take(MAX_CELLS) {
             let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
-            let of_cell = times(self.statistics.times(cell), self.statistics.of_limits, "relaxed");
+            let of_cell = times(self.statistics.times(cell), self.limits_of(cell), "relaxed");
             writeln!(f, "{:<11}{name}: {time} {}{of_cell}", format!("cell {}", cell.cell), unit(self.spec))?;
             if self.statistics.of_limits {
                 writeln!(f, "{:<11}t_relax {}", "", raw(&cell.times, self.spec))?;
@@ -239,8 +244,8 @@ impl Overview<'_> {
         let cell = |rank: u64| if cells.len() < 2 { String::new() } else { format!(", cell {rank}") };
         for GroupStatistics { group, times: of } in groups.iter().take(MAX_CELLS) {
             let name = shortened(group, MAX_GROUP);
-            let (time, of_limits) = (self.statistics.time(), self.statistics.of_limits);
-            let (cell, times) = (cell(of.cell), times(self.statistics.times(of), of_limits, "relaxed"));
+            let time = self.statistics.time();
+            let (cell, times) = (cell(of.cell), times(self.statistics.times(of), self.limits_of(of), "relaxed"));
             writeln!(f, "{:<11}{property} {name}{cell}: {time} {}{times}", "group", unit(self.spec))?;
         }
         match groups.len().saturating_sub(MAX_CELLS) {
@@ -400,8 +405,12 @@ results    out: summary.csv, run.json
 
     #[test]
     fn an_overview_says_that_no_member_relaxed() {
-        let text = overview(&Tally::default());
-        assert!(text.contains("t_relax    none of 0 members relaxed\n"), "{text}");
+        let mut tally = Tally::default();
+        let text = overview(&tally);
+        assert!(text.contains("t_relax    no member is known to have relaxed\n"), "{text}");
+        tally.add(&outcome(0, Status::Unfinished, None)).unwrap();
+        let text = overview(&tally);
+        assert!(text.contains("t_relax    none of 1 member relaxed\n"), "{text}");
     }
 
     #[test]

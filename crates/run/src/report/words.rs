@@ -116,9 +116,8 @@ pub(super) fn vanished(spec: &Spec, cell: &CellStatistics) -> Option<String> {
     match (of.sample.events(), *stopped) {
         (0, _) => None,
         (_, 0) => {
-            let Some(limits) = limits else { return Some(unit(spec) + &times(of, false, "vanished")) };
-            // Some members may have no limit, and then count as censored at their own time.
-            let (limits, raw) = (times(&limits.times, true, "vanished and have a limit"), raw(of, spec));
+            let Some(limits) = limits else { return Some(unit(spec) + &times(of, None, "vanished")) };
+            let (limits, raw) = (times(&limits.times, Some(of), "vanished and have a limit"), raw(of, spec));
             Some(format!("limit {}{limits}; {raw}", unit(spec)))
         }
         (known, stopped) => {
@@ -137,9 +136,9 @@ pub(super) fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Itera
         });
         match (of.stopped, of.times.sample.events()) {
             (0, _) | (_, 0) => {
-                let limit = if of.limits.is_some() { "limit " } else { "" };
+                let (limit, raw) = if of.limits.is_some() { ("limit ", Some(&of.times)) } else { ("", None) };
                 let unit = unit(spec);
-                format!("{}: {limit}{unit}{}{error}", event.name, times(of.judged(), of.limits.is_some(), "reached it"))
+                format!("{}: {limit}{unit}{}{error}", event.name, times(of.judged(), raw, "reached it"))
             }
             (stopped, known) => {
                 let stopped = count(stopped, "member");
@@ -178,12 +177,12 @@ pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
     format!(", t_limit = {}{unit}", curvelax_base::text::significant(t_limit, 4))
 }
 
-/// The time of a member with its error, or until when it had not relaxed.
+/// The time of a member with its error, or until when it had not relaxed, if that is known.
 pub fn member_time(member: &MemberTime) -> String {
     match member.shown() {
         Some((t, Some(error))) => with_error(t, error),
         Some((t, None)) => significant(t),
-        None => format!("> {}", significant(member.t_end)),
+        None => member.later_than.map_or("not known".into(), |t| format!("> {}", significant(t))),
     }
 }
 
@@ -206,24 +205,27 @@ fn beside(t: f64, error: f64) -> (String, String) {
     }
 }
 
-/// Median and mean of the times at which members `did` something, and how reliable they are; limits have intervals for
-/// more than sampling.
-pub(super) fn times(of: &TimeStatistics, of_limits: bool, did: &str) -> String {
+/// Median and mean of the times at which members `did` something, and how reliable they are. Limits, those of the times
+/// `raw`, have intervals for more than sampling.
+pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
+    if members == 0 {
+        return format!("no member is known to have {did}");
+    }
     let Some(mean) = of.mean else { return format!("none of {members} {} {did}", plural(members, "member")) };
     let half = || format!("no median, as fewer than half of the members {did}");
     let median = of.median().map_or_else(half, |median| format!("median {}", significant(median)));
-    let both = if of_limits { ", for sampling and discretisation" } else { "" };
+    let both = if raw.is_some() { ", for sampling and discretisation" } else { "" };
     let interval =
         of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
-    let censored = match members - known {
-        0 => String::new(),
-        censored => format!("; {censored} censored"),
-    };
+    let without = raw.map_or(0, |raw| raw.sample.events() as u64).saturating_sub(known);
+    let others = [(without, "without a limit"), (members - known - without.min(members - known), "censored")];
+    let others = others.into_iter().filter(|(count, _)| *count > 0).map(|(count, how)| format!("; {count} {how}"));
+    let others: String = others.collect();
     format!(
-        "{median}{interval}, mean {least}{}{error} over {known} {} that {did}{censored}",
+        "{median}{interval}, mean {least}{}{error} over {known} {} that {did}{others}",
         significant(mean.value),
         plural(known, "member")
     )

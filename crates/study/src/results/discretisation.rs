@@ -22,15 +22,17 @@ pub struct DiscretisationError {
 impl DiscretisationError {
     /// Summarises members that ran at the levels; none if there are none.
     pub fn of(judged: &[Limit]) -> Result<Option<DiscretisationError>> {
-        let relative = Description::new(judged.iter().map(|limit| limit.relative))?;
-        let bars = Description::new(judged.iter().map(Limit::relative_error))?;
+        // What holds at the start has no error of this kind.
+        let judged = || judged.iter().filter(|limit| limit.t > 0.0);
+        let relative = Description::new(judged().map(|limit| limit.relative))?;
+        let bars = Description::new(judged().map(Limit::relative_error))?;
         let sampling = HALF_INTERVAL * relative.standard_error().unwrap_or(0.0);
         // The few that do not converge yet are counted, and not typical.
         Ok(relative.mean().zip(bars.median()).map(|(mean, bar)| DiscretisationError {
-            members: judged.len(),
+            members: relative.count(),
             mean,
             error: sampling + bar,
-            not_asymptotic: judged.iter().filter(|limit| !limit.asymptotic).count(),
+            not_asymptotic: judged().filter(|limit| !limit.asymptotic).count(),
         }))
     }
 
@@ -91,7 +93,7 @@ impl CellLimits {
             error: Description::new(judged.iter().map(|limit| limit.error))?.median(),
             ends,
             widest: widest.map(Limit::relative_error),
-            fixed: widest.map(|limit| limit.fixed / limit.t),
+            fixed: widest.map(Limit::relative_fixed),
         }))
     }
 

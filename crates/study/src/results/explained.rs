@@ -69,8 +69,9 @@ pub struct FeaturedMember {
     pub numbers: Vec<f64>,
     /// Each of the [times](Explained::times), if it was reached.
     pub times: Vec<Option<f64>>,
-    /// When it ended.
-    pub t_end: f64,
+    /// A time that it had not reached, for one without the first of the [times](Explained::times); NaN if none is
+    /// known.
+    pub later_than: f64,
 }
 
 /// What explains the times of all cells.
@@ -230,7 +231,7 @@ mod tests {
                 place: i,
                 numbers: vec![b, a, 7.0, unknown],
                 times: vec![t, t.map(|t| 0.5 * t)],
-                t_end: 2.0,
+                later_than: 2.0,
             }
         };
         (0..count).map(member).collect()

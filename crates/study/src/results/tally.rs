@@ -43,6 +43,8 @@ pub struct Tally {
     pub stops: bool,
     /// Whether a driving force may make members vanish.
     pub driven: bool,
+    /// By cell: whether its members are vesicles; empty if none are.
+    vesicles: Vec<bool>,
     /// What helps those that failed.
     remedies: Remedies,
     /// What distinguishes the cells.
@@ -83,8 +85,8 @@ pub struct MemberTime {
     pub label: String,
     /// How it ended.
     pub status: Status,
-    /// When it ended.
-    pub t_end: f64,
+    /// When it ended, if it is known not to have relaxed by then.
+    pub later_than: Option<f64>,
     /// Its relaxation time.
     pub t_relax: Option<f64>,
     /// When it vanished.
@@ -100,14 +102,16 @@ pub struct MemberTime {
 }
 
 impl MemberTime {
-    fn new(outcome: &Outcome, refined: bool) -> MemberTime {
+    fn new(outcome: &Outcome, counted: Counted) -> MemberTime {
+        let Counted { refined, vesicles, .. } = counted;
         let Outcome { member, cell, status, t_end, t_relax, t_vanish, t_limit, t_error, .. } = *outcome;
+        let later_than = Some(t_end).filter(|_| !vesicles && t_relax.is_none());
         let limit = |i: usize| outcome.limit_of_event(i).filter(|_| refined);
         let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
         let events = outcome.events.iter().enumerate().map(event).collect();
         let label = outcome.label.clone();
         let vanishing = outcome.t_vanish_limit.zip(outcome.t_vanish_error);
-        MemberTime { member, cell, label, status, t_end, t_relax, t_vanish, vanishing, t_limit, t_error, events }
+        MemberTime { member, cell, label, status, later_than, t_relax, t_vanish, vanishing, t_limit, t_error, events }
     }
 
     /// The time that is shown: the limit, if there is one, with its error.
@@ -143,8 +147,13 @@ impl Rate {
 pub struct CellTally {
     /// Members, by status in the order of [`Status::ALL`].
     pub counts: [u64; Status::ALL.len()],
-    /// Times at which members relaxed, or up to which they had not.
+    /// Times at which members relaxed, or up to which they had not. A vesicle that is not at rest at its end is in
+    /// neither, since where it comes to rest is not known.
     pub times: Observations,
+    /// Such vesicles.
+    moving: u64,
+    /// Members that relaxed, and have no limit of the time although one was asked for.
+    without_limit: u64,
     /// Members that have not relaxed, by status.
     pub others: [u64; Status::ALL.len()],
     /// Simple curves whose final time came before they relaxed.
@@ -178,6 +187,8 @@ pub struct EventTally {
     pub stopped: u64,
     /// Members in which it happened.
     reached: u64,
+    /// Those of them that have no limit of the time, although one was asked for.
+    without_limit: u64,
 }
 
 /// What decides on how members are counted.
@@ -186,20 +197,26 @@ struct Counted {
     refined: bool,
     stops: bool,
     driven: bool,
+    vesicles: bool,
 }
 
 impl CellTally {
     fn add(&mut self, outcome: &Outcome, counted: Counted) -> Result<()> {
-        let Counted { refined, stops, driven } = counted;
+        let Counted { refined, stops, driven, vesicles } = counted;
         let CellTally { counts, times, others, late, area, rates, limits, judged, events, vanishing, .. } = self;
-        times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        let is_known = !vesicles || outcome.t_relax.is_some();
+        if is_known {
+            times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
+        }
+        self.moving += u64::from(!is_known && outcome.status == Status::Unfinished);
         // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
         let limited = |limit: Option<f64>, t: Option<f64>| match limit {
             Some(_) => Observation::new(limit, outcome.t_end),
             None => Observation::new(None, t.unwrap_or(outcome.t_end)),
         };
-        if refined {
+        if refined && is_known {
             limits.push(limited(outcome.t_limit, outcome.t_relax))?;
+            self.without_limit += u64::from(outcome.t_relax.is_some() && outcome.t_limit.is_none());
         }
         judged.extend(outcome.judged);
         events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
@@ -210,6 +227,7 @@ impl CellTally {
             let judged = outcome.limit_of_event(i);
             if refined {
                 own.limits.push(limited(judged.map(|limit| limit.t), *t))?;
+                own.without_limit += u64::from(t.is_some() && judged.is_none());
             }
             own.judged.extend(judged);
         }
@@ -217,6 +235,7 @@ impl CellTally {
             vanishing.times.push(Observation::new(outcome.t_vanish, outcome.t_end))?;
             if refined {
                 vanishing.limits.push(limited(outcome.t_vanish_limit, outcome.t_vanish))?;
+                vanishing.without_limit += u64::from(outcome.t_vanish.is_some() && outcome.t_vanish_limit.is_none());
             }
             vanishing.judged.extend(outcome.judged_vanishing);
             vanishing.reached += u64::from(outcome.t_vanish.is_some());
@@ -305,12 +324,14 @@ impl Tally {
         let stops = spec.stops_when_relaxed();
         let driven = spec.drive.is_some() || spec.sweep.has("drive");
         let sweep = spec.sweep.clone();
+        let vesicles = (0..sweep.cells()).take_while(|_| spec.keeps_both()).map(|cell| spec.has_vesicles_in(cell));
         let has_outlines = spec.rounding.is_some() || spec.sweep.has("rounding");
         Tally {
             has_outlines,
             refined: spec.refine,
             stops,
             driven,
+            vesicles: vesicles.collect(),
             remedies: Remedies::of(spec),
             sweep,
             levels: levels.rows(),
@@ -326,12 +347,13 @@ impl Tally {
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let (cell, refined) = (outcome.cell as usize, self.refined);
-        let counted = Counted { refined, stops: self.stops, driven: self.driven };
+        let vesicles = self.vesicles.get(cell).copied().unwrap_or_default();
+        let counted = Counted { refined, stops: self.stops, driven: self.driven, vesicles };
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
         if self.named.len() < MAX_KNOWN && self.cells[cell].counts.iter().sum::<u64>() < MAX_NAMED {
-            self.named.push(MemberTime::new(outcome, refined));
+            self.named.push(MemberTime::new(outcome, counted));
         }
         self.cells[cell].add(outcome, counted)?;
         if !outcome.group.is_empty() {

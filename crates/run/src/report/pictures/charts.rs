@@ -351,13 +351,14 @@ impl FinishedRun<'_> {
         let panel = |i: usize, group: &CellGroup| {
             let own = |member: &&FeaturedMember| group.cells.contains(&(member.cell as usize));
             let known = drawn.iter().filter(own).filter(|member| member.numbers[i].is_finite());
+            let known = known.filter(|member| first_time(member).unwrap_or(member.later_than).is_finite());
             let point = |member: &FeaturedMember| {
-                let t = member.times.first().copied().flatten();
+                let t = first_time(member);
                 ScatterPoint {
                     cell: member.cell as usize,
                     member: member.member,
                     x: member.numbers[i],
-                    t: t.unwrap_or(member.t_end),
+                    t: t.unwrap_or(member.later_than),
                     happened: t.is_some(),
                 }
             };
@@ -411,11 +412,11 @@ impl FinishedRun<'_> {
     /// The times of members that are known by name.
     fn members(&self, medium: Medium) -> Chart {
         let dot = |member: &MemberTime| {
-            let (t, error) = member.shown().unwrap_or((member.t_end, None));
+            let (t, error) = member.shown().or(member.later_than.map(|t| (t, None)))?;
             let name = member_name(self.spec(), member);
-            MemberDot { name, t, error, happened: member.shown().is_some() }
+            Some(MemberDot { name, t, error, happened: member.shown().is_some() })
         };
-        let members: Vec<MemberDot> = self.tally.named.iter().map(dot).collect();
+        let members: Vec<MemberDot> = self.tally.named.iter().filter_map(dot).collect();
         let has = |of: &dyn Fn(&MemberDot) -> bool| members.iter().any(of);
         let bar =
             if has(&|member| member.error.is_some()) { " Bar: its 95 % interval, which the dot may hide." } else { "" };
@@ -471,6 +472,11 @@ fn r2(row: &ExplainedRow) -> String {
 /// Times at which an event happened in members, or at which they ended without it.
 fn happened(sample: &Sample, happened: bool) -> impl Iterator<Item = f64> + '_ {
     sample.observations().filter(move |seen| seen.happened == happened).map(|seen| seen.time)
+}
+
+/// The time of a member that is explained first, if it reached it.
+fn first_time(member: &FeaturedMember) -> Option<f64> {
+    member.times.first().copied().flatten()
 }
 
 /// The survival curve of some times, with its band.

@@ -1,7 +1,7 @@
 //! What the user should know about the results of a run, from its totals.
 
 use super::{CellTally, DISTRUSTED_DRIFT, RELAXED, Tally};
-use curvelax_base::text::{plural, significant};
+use curvelax_base::text::{count, plural, significant};
 use curvelax_ensemble::Status;
 
 /// Maximum number of cells that a warning names.
@@ -30,6 +30,8 @@ impl Tally {
                 self.below_rounding
             ));
         }
+        warnings.extend(self.moving());
+        warnings.extend(self.without_limits());
         let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
         let open = judged().filter(|limit| limit.is_open()).count();
         if self.refined && open > 0 {
@@ -88,6 +90,40 @@ impl Tally {
         })
     }
 
+    /// The warning about vesicles that still moved at their final time, beside others that had come to rest.
+    fn moving(&self) -> Option<String> {
+        let some = self.cells.iter().filter(|cell| cell.counts[RELAXED] > 0);
+        let moving: u64 = some.map(|cell| cell.moving).sum();
+        (moving > 0).then(|| {
+            format!(
+                "{moving} of {} still moved at their final time: when they relax is not known, and times are those of the \
+                 others, mostly the fast ones; {}",
+                count(self.members(), "member"),
+                self.remedies.of_time()
+            )
+        })
+    }
+
+    /// The warnings about times without a limit where limits were asked for, of one kind each.
+    fn without_limits(&self) -> Vec<String> {
+        let of_events =
+            |i: usize| self.cells.iter().filter_map(move |cell| cell.events.get(i)).map(|of| of.without_limit);
+        let named =
+            self.events.iter().enumerate().map(|(i, name)| (format!("reached the event {name}"), of_events(i).sum()));
+        let relaxed: u64 = self.cells.iter().map(|cell| cell.without_limit).sum();
+        let vanished: u64 = self.cells.iter().map(|cell| cell.vanishing.without_limit).sum();
+        let kinds = [("relaxed".to_string(), relaxed), ("vanished".to_string(), vanished)].into_iter().chain(named);
+        let told = |(did, without): (String, u64)| {
+            let round = if did == "vanished" { ", or were not round at the end" } else { "" };
+            format!(
+                "{without} of {} {did} and have no limit, since they did not at another level (see levels.csv){round}: among \
+                 the limits they count as later than their own time; use more --points",
+                count(self.members(), "member")
+            )
+        };
+        kinds.filter(|(_, without)| *without > 0).map(told).collect()
+    }
+
     /// The warning about cells in which no member relaxed, because the final time came first.
     fn late(&self) -> Option<String> {
         let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
@@ -108,5 +144,61 @@ impl Tally {
             "no member relaxed before its final time in {cells} of {all} cells ({}); {remedy}",
             named.join("; ")
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::samples::outcome;
+    use curvelax_ensemble::{LevelTimes, Outcome, Spec};
+
+    fn of(spec: &str, members: &[Outcome]) -> Tally {
+        let mut tally = Tally::of(&Spec::from_toml(spec).unwrap(), &LevelTimes::default());
+        members.iter().for_each(|member| tally.add(member).unwrap());
+        tally
+    }
+
+    #[test]
+    fn a_vesicle_that_still_moves_is_not_known_to_relax_later() {
+        let own = || {
+            let mut moving = outcome(0, Status::Unfinished, None);
+            moving.end.turning = 1;
+            [moving, outcome(1, Status::Relaxed, Some(0.5)), outcome(2, Status::Unfinished, None)]
+        };
+        let vesicles = of("flow = 'willmore'\nconserve = 'area,length'", &own());
+        assert_eq!(vesicles.cells[0].times.len(), 1);
+        assert_eq!(vesicles.named[0].later_than, None);
+        let warning = "2 of 3 members still moved at their final time: when they relax is not known, and times are those \
+                       of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
+        assert_eq!(vesicles.warnings(), [warning]);
+        // The control: members with one of the two are censored, in a sweep, too.
+        let sweep = "flow = 'willmore'\n[sweep]\nconserve = ['area', 'area,length']";
+        let others = own().map(|of| Outcome { cell: 1, ..of });
+        let both = of(sweep, &[&own()[..], &others].concat());
+        assert_eq!((both.cells[0].times.len(), both.cells[1].times.len()), (3, 1));
+        assert_eq!((both.named[0].later_than, both.named[3].later_than), (Some(2.0), None));
+    }
+
+    #[test]
+    fn times_without_a_limit_are_told_where_limits_were_asked_for() {
+        let relaxed = |t_limit, event, vanished: bool| Outcome {
+            t_limit,
+            events: vec![event],
+            t_vanish: vanished.then_some(1.5),
+            ..outcome(0, Status::Relaxed, Some(0.5))
+        };
+        let members = [relaxed(Some(0.4), None, false), relaxed(None, Some(0.2), true), relaxed(None, None, false)];
+        let spec = "drive = 0.5\nadaptive = 1e-3\nevent = ['early = k_min >= 0']";
+        let told = of(&format!("refine = true\n{spec}"), &members).warnings();
+        let starts = [
+            "2 of 3 members relaxed and have",
+            "1 of 3 members vanished and",
+            "1 of 3 members reached the event early",
+        ];
+        assert_eq!(told.len(), starts.len(), "{told:?}");
+        assert!(told.iter().zip(starts).all(|(told, start)| told.starts_with(start)), "{told:?}");
+        assert!(told[1].contains("or were not round at the end") && !told[0].contains("round"), "{told:?}");
+        assert_eq!(of(spec, &members).warnings(), [""; 0]);
     }
 }
