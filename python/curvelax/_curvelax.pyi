@@ -53,6 +53,9 @@ class FinishedRun:
     def survival_of(times: list[float], happened: list[bool]) -> tuple[list[NDArray[np.float64]], float | None]:
         """The same of any times, of which those that did not happen are censored."""
 
+    def has_vesicles(self, cell: int) -> bool:
+        """Whether the members of a cell are vesicles."""
+
     def time_unit(self) -> str | None:
         """The unit of times, if it has a name."""
 

@@ -135,7 +135,8 @@ class Keys(TypedDict, total=False):
     """Move nodes along the normal only. By default false."""
 
     relax_to: float
-    """Count a member as relaxed at this fraction of its initial excess. By default 0.01."""
+    """Count a member as relaxed at this fraction of its initial excess, or of the energy of a vesicle (conserve). By
+    default 0.01."""
 
     relax_at: float
     """Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of relax-to.

@@ -260,7 +260,9 @@ class Study:
         for cell in self.ensemble.cell:
             own = self.summary[self.summary.cell == cell]
             happened = own.t_half.notna()
-            numbers, last = self._run.survival_of(own.t_half.fillna(own.t_end).tolist(), happened.tolist())
+            # Of a vesicle that still moves at the end nothing is known.
+            later_than = 0.0 if self._run.has_vesicles(int(cell)) else own.t_end
+            numbers, last = self._run.survival_of(own.t_half.fillna(later_than).tolist(), happened.tolist())
             curves.append((int(cell), numbers, last))
         return curves
 

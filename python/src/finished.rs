@@ -106,6 +106,11 @@ impl FinishedRun {
         [shown].into_iter().chain(others).map(String::from).chain(events).collect()
     }
 
+    /// Whether the members of a cell are vesicles.
+    fn has_vesicles(&self, cell: u64) -> bool {
+        self.run.provenance.spec.has_vesicles_in(cell)
+    }
+
     /// The survival curve of each cell for t_limit, t_relax or an event, which is in the limit if it has one.
     ///
     /// # Errors

@@ -98,14 +98,14 @@ impl Ladder {
     }
 
     /// What it tells of the time `own` at the nodes of `spec`, judged as `of`, with the curve at its finest level;
-    /// nothing if it is too short, does not have these nodes, or the time is 0.
+    /// nothing if it is too short, does not have these nodes, or the time is 0 at some levels only.
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         if levels.len() < RefinementLevel::FIRST.len() {
             return None;
         }
-        // What holds at the start has no time to judge.
+        // What holds at the start does so with any number of nodes.
         if times.iter().chain([&own]).all(|t| *t == 0.0) {
             return Some(Limit::AT_START);
         }

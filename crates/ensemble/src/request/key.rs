@@ -290,7 +290,8 @@ keys! {
         /// Number type [default: f64 where the device has it]
         #[serde(skip_serializing_if = "Option::is_none")]
         precision: Option<Precision> = None, "TYPE", Machine;
-        /// Count a member as relaxed at this fraction of its initial excess [default: 0.01]
+        /// Count a member as relaxed at this fraction of its initial excess, or of the energy of a vesicle (--conserve)
+        /// [default: 0.01]
         #[serde(skip_serializing_if = "Option::is_none")]
         relax_to: Option<f64> = None, "FRACTION", Evolution;
         /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of

@@ -195,13 +195,10 @@ pub(super) fn with_error(t: f64, error: f64) -> String {
 /// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of
 /// ten.
 fn beside(t: f64, error: f64) -> (String, String) {
-    let digits = 1 - error.log10().floor() as i32;
-    match error > 0.0 && (1e-4..1e6).contains(&t.abs()) && (0..=12).contains(&digits) {
-        true => {
-            let digits = digits as usize;
-            (format!("{t:.digits$}"), format!("{error:.digits$}"))
-        }
-        false => (significant(t), rounded(error, 2)),
+    let digits = || usize::try_from(1 - error.log10().floor() as i32).ok().filter(|digits| *digits <= 12);
+    match Some(()).filter(|()| error > 0.0 && (1e-4..1e6).contains(&t.abs())).and_then(|()| digits()) {
+        Some(digits) => (format!("{t:.digits$}"), format!("{error:.digits$}")),
+        None => (significant(t), rounded(error, 2)),
     }
 }
 
@@ -209,9 +206,6 @@ fn beside(t: f64, error: f64) -> (String, String) {
 /// `raw`, have intervals for more than sampling.
 pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str) -> String {
     let (members, known) = (of.sample.len() as u64, of.sample.events() as u64);
-    if members == 0 {
-        return format!("no member is known to have {did}");
-    }
     let Some(mean) = of.mean else { return format!("none of {members} {} {did}", plural(members, "member")) };
     let half = || format!("no median, as fewer than half of the members {did}");
     let median = of.median().map_or_else(half, |median| format!("median {}", significant(median)));

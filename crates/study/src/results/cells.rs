@@ -1,7 +1,7 @@
 //! `ensemble.csv`: the statistics of relaxation times and decay rates, one row per cell.
 //!
 //! A member whose time is unknown is censored where it ended: at the final time if it is unfinished, or at its last
-//! good state if it ended badly. The row counts these members.
+//! good state if it ended badly; a vesicle, of which that says nothing, at 0. The row counts these members.
 
 use std::mem;
 

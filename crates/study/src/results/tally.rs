@@ -147,8 +147,8 @@ impl Rate {
 pub struct CellTally {
     /// Members, by status in the order of [`Status::ALL`].
     pub counts: [u64; Status::ALL.len()],
-    /// Times at which members relaxed, or up to which they had not. A vesicle that is not at rest at its end is in
-    /// neither, since where it comes to rest is not known.
+    /// Times at which members relaxed, or up to which they had not: 0 for a vesicle that is not at rest at its end, of
+    /// which nothing is known.
     pub times: Observations,
     /// Such vesicles.
     moving: u64,
@@ -204,18 +204,16 @@ impl CellTally {
     fn add(&mut self, outcome: &Outcome, counted: Counted) -> Result<()> {
         let Counted { refined, stops, driven, vesicles } = counted;
         let CellTally { counts, times, others, late, area, rates, limits, judged, events, vanishing, .. } = self;
-        let is_known = !vesicles || outcome.t_relax.is_some();
-        if is_known {
-            times.push(Observation::new(outcome.t_relax, outcome.t_end))?;
-        }
-        self.moving += u64::from(!is_known && outcome.status == Status::Unfinished);
+        let later_than = if vesicles { 0.0 } else { outcome.t_end };
+        times.push(Observation::new(outcome.t_relax, later_than))?;
+        self.moving += u64::from(vesicles && outcome.status == Status::Unfinished);
         // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
-        let limited = |limit: Option<f64>, t: Option<f64>| match limit {
-            Some(_) => Observation::new(limit, outcome.t_end),
-            None => Observation::new(None, t.unwrap_or(outcome.t_end)),
+        let limited = |limit: Option<f64>, t: Option<f64>, later_than: f64| match limit {
+            Some(_) => Observation::new(limit, later_than),
+            None => Observation::new(None, t.unwrap_or(later_than)),
         };
-        if refined && is_known {
-            limits.push(limited(outcome.t_limit, outcome.t_relax))?;
+        if refined {
+            limits.push(limited(outcome.t_limit, outcome.t_relax, later_than))?;
             self.without_limit += u64::from(outcome.t_relax.is_some() && outcome.t_limit.is_none());
         }
         judged.extend(outcome.judged);
@@ -226,7 +224,7 @@ impl CellTally {
             own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
             let judged = outcome.limit_of_event(i);
             if refined {
-                own.limits.push(limited(judged.map(|limit| limit.t), *t))?;
+                own.limits.push(limited(judged.map(|limit| limit.t), *t, outcome.t_end))?;
                 own.without_limit += u64::from(t.is_some() && judged.is_none());
             }
             own.judged.extend(judged);
@@ -234,7 +232,7 @@ impl CellTally {
         if driven {
             vanishing.times.push(Observation::new(outcome.t_vanish, outcome.t_end))?;
             if refined {
-                vanishing.limits.push(limited(outcome.t_vanish_limit, outcome.t_vanish))?;
+                vanishing.limits.push(limited(outcome.t_vanish_limit, outcome.t_vanish, outcome.t_end))?;
                 vanishing.without_limit += u64::from(outcome.t_vanish.is_some() && outcome.t_vanish_limit.is_none());
             }
             vanishing.judged.extend(outcome.judged_vanishing);

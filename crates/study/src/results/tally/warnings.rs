@@ -96,8 +96,8 @@ impl Tally {
         let moving: u64 = some.map(|cell| cell.moving).sum();
         (moving > 0).then(|| {
             format!(
-                "{moving} of {} still moved at their final time: when they relax is not known, and times are those of the \
-                 others, mostly the fast ones; {}",
+                "{moving} of {} still moved at their final time: when they relax is not known, and the statistics are \
+                 of the others, mostly the fast ones; {}",
                 count(self.members(), "member"),
                 self.remedies.of_time()
             )
@@ -106,22 +106,26 @@ impl Tally {
 
     /// The warnings about times without a limit where limits were asked for, of one kind each.
     fn without_limits(&self) -> Vec<String> {
-        let of_events =
-            |i: usize| self.cells.iter().filter_map(move |cell| cell.events.get(i)).map(|of| of.without_limit);
-        let named =
-            self.events.iter().enumerate().map(|(i, name)| (format!("reached the event {name}"), of_events(i).sum()));
-        let relaxed: u64 = self.cells.iter().map(|cell| cell.without_limit).sum();
-        let vanished: u64 = self.cells.iter().map(|cell| cell.vanishing.without_limit).sum();
-        let kinds = [("relaxed".to_string(), relaxed), ("vanished".to_string(), vanished)].into_iter().chain(named);
-        let told = |(did, without): (String, u64)| {
-            let round = if did == "vanished" { ", or were not round at the end" } else { "" };
+        // Nothing is told of an event before which members were stopped.
+        let of_event =
+            |i: usize| self.cells.iter().filter_map(move |cell| cell.events.get(i)).filter(|of| of.stopped == 0);
+        let named = self.events.iter().enumerate().map(|(i, name)| {
+            let without: u64 = of_event(i).map(|of| of.without_limit).sum();
+            (format!("reached the event {name}"), "event_levels.csv", without)
+        });
+        let relaxed = self.cells.iter().map(|cell| cell.without_limit).sum();
+        let vanished = self.cells.iter().map(|cell| cell.vanishing.without_limit).sum();
+        let kinds = [("relaxed", relaxed), ("vanished", vanished)];
+        let kinds = kinds.into_iter().map(|(did, without)| (did.to_string(), "levels.csv", without)).chain(named);
+        let told = |(did, file, without): (String, &str, u64)| {
+            let members = count(self.members(), "member");
+            let round = if did == "vanished" { ", or they were not round at the end" } else { "" };
             format!(
-                "{without} of {} {did} and have no limit, since they did not at another level (see levels.csv){round}: among \
-                 the limits they count as later than their own time; use more --points",
-                count(self.members(), "member")
+                "{without} of {members} {did} and have no limit, as their times at the levels do not tell one (see {file})\
+                 {round}: among the limits they count as later than their own time; more --points may help"
             )
         };
-        kinds.filter(|(_, without)| *without > 0).map(told).collect()
+        kinds.filter(|(.., without)| *without > 0).map(told).collect()
     }
 
     /// The warning about cells in which no member relaxed, because the final time came first.
@@ -167,16 +171,18 @@ mod tests {
             [moving, outcome(1, Status::Relaxed, Some(0.5)), outcome(2, Status::Unfinished, None)]
         };
         let vesicles = of("flow = 'willmore'\nconserve = 'area,length'", &own());
-        assert_eq!(vesicles.cells[0].times.len(), 1);
+        let later_than =
+            |of: &Tally, cell: usize| of.cells[cell].times.iter().map(|seen| seen.time).collect::<Vec<_>>();
+        assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
-        let warning = "2 of 3 members still moved at their final time: when they relax is not known, and times are those \
-                       of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
+        let warning = "2 of 3 members still moved at their final time: when they relax is not known, and the statistics \
+                       are of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
         // The control: members with one of the two are censored, in a sweep, too.
         let sweep = "flow = 'willmore'\n[sweep]\nconserve = ['area', 'area,length']";
         let others = own().map(|of| Outcome { cell: 1, ..of });
         let both = of(sweep, &[&own()[..], &others].concat());
-        assert_eq!((both.cells[0].times.len(), both.cells[1].times.len()), (3, 1));
+        assert_eq!((later_than(&both, 0), later_than(&both, 1)), (vec![2.0, 0.5, 2.0], vec![0.0, 0.5, 0.0]));
         assert_eq!((both.named[0].later_than, both.named[3].later_than), (Some(2.0), None));
     }
 
@@ -198,7 +204,7 @@ mod tests {
         ];
         assert_eq!(told.len(), starts.len(), "{told:?}");
         assert!(told.iter().zip(starts).all(|(told, start)| told.starts_with(start)), "{told:?}");
-        assert!(told[1].contains("or were not round at the end") && !told[0].contains("round"), "{told:?}");
+        assert!(told[1].contains("or they were not round at the end") && !told[0].contains("round"), "{told:?}");
         assert_eq!(of(spec, &members).warnings(), [""; 0]);
     }
 }
