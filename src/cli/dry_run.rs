@@ -31,9 +31,11 @@ fn table(estimate: &Estimate, spec: &Spec) -> String {
     let Estimate { members, cells, slots, pilot, .. } = estimate;
     let unknown = |what: &str| format!("not known: the pilot was over before {what}");
     let which = plural(*members, "member");
+    // Whether some members may need levels of which the pilot has not told.
+    let is_open = spec.refine && estimate.finer_members.is_none() && estimate.most_points > spec.points;
     let rows = [
         ("members", format!("{members} in {cells} {}", plural(*cells as u64, "cell"))),
-        ("levels", levels(estimate)),
+        ("levels", levels(estimate, is_open)),
         ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
         ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
         ("memory", format!("about {}", bytes(estimate.memory_bytes))),
@@ -46,7 +48,10 @@ fn table(estimate: &Estimate, spec: &Spec) -> String {
         ("start-up", duration(estimate.start_up_seconds)),
         (
             "time",
-            estimate.seconds.map_or(unknown("a step"), |seconds| format!("about {} after start-up", duration(seconds))),
+            estimate.seconds.map_or(unknown("a step"), |seconds| {
+                let least = if is_open { "at least" } else { "about" };
+                format!("{least} {} after start-up", duration(seconds))
+            }),
         ),
         ("pilot", started(pilot)),
     ];
@@ -63,10 +68,20 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
 }
 
 /// The members that run besides, for the error of discretisation.
-fn levels(Estimate { level_members, finer_members, varied_members, most_points, .. }: &Estimate) -> String {
-    let finer = finer_members.filter(|finer| *finer > 0).map_or(String::new(), |finer| {
-        format!("; about {finer} {} more nodes, up to n = {most_points}", if finer == 1 { "needs" } else { "need" })
-    });
+fn levels(
+    Estimate { level_members, finer_members, varied_members, most_points, .. }: &Estimate,
+    is_open: bool,
+) -> String {
+    let finer = match *finer_members {
+        Some(0) => String::new(),
+        Some(finer) => {
+            format!("; about {finer} {} more nodes, up to n = {most_points}", if finer == 1 { "needs" } else { "need" })
+        }
+        None if is_open => {
+            format!("; some may need more nodes, up to n = {most_points}: the pilot was over before it could tell")
+        }
+        None => String::new(),
+    };
     let varied = match varied_members {
         0 => String::new(),
         members => format!("; {members} on other curves through their outlines"),
@@ -130,6 +145,14 @@ pilot      130 of 130 started members ended in 1.40 s
         assert!(table(&finer, &Spec::default()).contains(told));
         let varied = Estimate { varied_members: 8, ..finer };
         assert!(table(&varied, &Spec::default()).contains("n = 1600; 8 on other curves through their outlines\n"));
+        // Pilots that end before their members do not tell which need more nodes.
+        let untold = Estimate { finer_members: None, most_points: 1600, ..estimate.clone() };
+        let untold = table(&untold, &Spec { refine: true, ..Spec::default() });
+        assert!(
+            untold.contains("resolutions; some may need more nodes, up to n = 1600: the pilot was over"),
+            "{untold}"
+        );
+        assert!(untold.contains("time       at least 31.9 s after start-up\n"), "{untold}");
         let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
         assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
     }

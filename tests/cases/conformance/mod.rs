@@ -51,8 +51,8 @@ const SIZES: [usize; 6] = [6, 7, 64, 99, 101, 257];
 const FEW_SIZES: [usize; 2] = [7, 101];
 
 /// Sizes of the adaptive comparison, whose kernels take the longest to compile. Those of other forms and forces, and of
-/// events, are compared at few of them, in f32, and at one in f64: what differs with the size is in the kernels of the
-/// paper's form, too. `tests/run` has other forms and forces by [two of the four kinds](has_forms).
+/// events, are compared at one, with `tests/run --all` in f32 at few of them: what differs with the size is in the
+/// kernels of the paper's form, too. `tests/run` has other forms and forces by [two of the four kinds](has_forms).
 const ADAPTIVE_SIZES: [usize; 3] = [7, 64, 101];
 const FEW_ADAPTIVE_SIZES: [usize; 2] = [7, 101];
 const ONE_ADAPTIVE_SIZE: [usize; 1] = [101];
@@ -158,7 +158,7 @@ fn cases<T: Evolves>(index: usize, gpu: &Gpu, solver: Solver) -> Vec<Trial> {
         add(
             "adaptive: where a dispatch ends changes no bit of driven and constrained curves".into(),
             forced_bits::<T>,
-            31,
+            101,
         );
     }
     for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
