@@ -158,7 +158,7 @@ fn cases<T: Evolves>(index: usize, gpu: &Gpu, solver: Solver) -> Vec<Trial> {
         add(
             "adaptive: where a dispatch ends changes no bit of driven and constrained curves".into(),
             forced_bits::<T>,
-            101,
+            31,
         );
     }
     for n in sizes(others, &ONE_ADAPTIVE_SIZE) {
