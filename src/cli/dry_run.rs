@@ -49,8 +49,8 @@ fn table(estimate: &Estimate, spec: &Spec) -> String {
         (
             "time",
             estimate.seconds.map_or(unknown("a step"), |seconds| {
-                let least = if is_open { "at least" } else { "about" };
-                format!("{least} {} after start-up", duration(seconds))
+                let without = if is_open { ", without levels of more nodes" } else { "" };
+                format!("about {} after start-up{without}", duration(seconds))
             }),
         ),
         ("pilot", started(pilot)),
@@ -152,7 +152,7 @@ pilot      130 of 130 started members ended in 1.40 s
             untold.contains("resolutions; some may need more nodes, up to n = 1600: the pilot was over"),
             "{untold}"
         );
-        assert!(untold.contains("time       at least 31.9 s after start-up\n"), "{untold}");
+        assert!(untold.contains("time       about 31.9 s after start-up, without levels of more nodes\n"), "{untold}");
         let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
         assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
     }

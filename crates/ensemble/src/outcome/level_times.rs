@@ -102,14 +102,11 @@ impl Ladder {
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
-        if levels.len() < RefinementLevel::FIRST.len() {
-            return None;
-        }
-        // What holds at the start does so with any number of nodes.
-        if times.iter().chain([&own]).all(|t| *t == 0.0) {
+        // What holds at the start, with more nodes, too, does so with any number of them.
+        if times[own_level..].iter().chain([&own]).all(|t| *t == 0.0) {
             return Some(Limit::AT_START);
         }
-        if !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
+        if levels.len() < RefinementLevel::FIRST.len() || !(own > 0.0 && times.iter().all(|t| *t > 0.0)) {
             return None;
         }
         let points = levels.iter().map(|level| level.points(spec.points)).collect();
@@ -125,7 +122,10 @@ impl Ladder {
         let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
         let levels = times;
-        Some(Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess }))
+        let limit =
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess });
+        // An event right after the start of a curve that its nodes do not resolve may have none that is a time.
+        (limit.t > 0.0 && limit.error.is_finite()).then_some(limit)
     }
 }
 
@@ -325,8 +325,27 @@ mod tests {
             (own.t_limit.zip(own.t_error), own.limit_of_event(0).map(|limit| limit.relative_error()))
         };
         assert_eq!(judged([0.0; 3]), (Some((0.0, 0.0)), Some(0.0)));
-        // With fewer nodes it does not hold.
-        assert_eq!(judged([0.1, 0.0, 0.0]), (None, None));
+        // Fewer nodes may not see it.
+        assert_eq!(judged([0.1, 0.1, 0.0]), (Some((0.0, 0.0)), Some(0.0)));
+        assert_eq!(judged([0.1, 0.0, 0.1]), (None, None));
+    }
+
+    #[test]
+    fn times_that_tend_below_0_have_no_limit() {
+        let spec = Spec::from_toml("points = 100\nadaptive = 1e-3\nrefine = true").unwrap();
+        let limit = |at_infinity: f64| {
+            let mut times = LevelTimes::default();
+            for level in RefinementLevel::FIRST {
+                let n = level.points(100) as f64;
+                let row = LevelRow { level: level.number(), excess_start: 0.2, ..LevelRow::default() };
+                times.add(&LevelRow { t_relax: Some(at_infinity + 10.0 / (n * n)), ..row }).unwrap();
+            }
+            let mut own = Outcome { t_relax: Some(at_infinity + 1e-3), ..Outcome::default() };
+            times.judge(&spec, &mut own);
+            own.t_limit
+        };
+        assert!(limit(1e-4).is_some_and(|t| t > 0.0));
+        assert_eq!(limit(-1e-4), None);
     }
 
     #[test]

@@ -13,6 +13,9 @@ const PER_HALVING: u32 = 16;
 const HALVINGS: u32 = 12;
 /// The energy is at its end if this part of the share was left at half the time.
 const AT_REST: f64 = 0.1;
+/// Where the energy comes back this near to the share, relatively, after it was below, or has come from below, the time
+/// jumps with the number of nodes, and is unknown.
+const NEAR: f64 = 0.2;
 /// A change of the energy, relatively, that is the rounding and the error of steps.
 const NO_CHANGE: f64 = 1e-6;
 
@@ -49,8 +52,17 @@ impl Settling {
         let late = left.iter().filter(|[t, _]| *t >= 0.5 * t_end * (1.0 - 1e-9));
         let settled = late.map(|[_, left]| left.abs()).fold(0.0, f64::max) <= AT_REST * self.share;
         // The end itself is the last.
-        if settled { [self.share, 0.5].map(|share| settles_within(share, &left)) } else { [None; 2] }
+        let within = |share| if is_steady(share, &left) { settles_within(share, &left) } else { None };
+        if settled { [self.share, 0.5].map(within) } else { [None; 2] }
     }
+}
+
+/// Whether a number settles within `share` of 0 at about the time at which it does within a share that is a little
+/// larger or smaller.
+fn is_steady(share: f64, values: &[[f64; 2]]) -> bool {
+    let last_beyond = |factor: f64| values.iter().rposition(|[_, value]| value.abs() > factor * share).unwrap_or(0);
+    let [from, to] = [1.0 + NEAR, 1.0 - NEAR].map(last_beyond);
+    values[from..=to].windows(2).all(|pair| pair[1][1].abs() <= pair[0][1].abs())
 }
 
 /// From when on a number stays within `share` of 0, of its `values` at times: the time is a cubic in the logarithms of
@@ -112,6 +124,21 @@ mod tests {
             (relaxed - 100f64.ln() / 5.0).abs() < 1e-5 && (half - 2f64.ln() / 5.0).abs() < 1e-5,
             "{relaxed} {half}"
         );
+    }
+
+    #[test]
+    fn an_energy_that_comes_back_near_the_share_has_no_time() {
+        // Below its end from t = 0.08 on, by so many hundredths at 0.5.
+        let dips = |depth: f64| {
+            settling(
+                |t| 3.0 + (1.0 - 0.01 * depth) * (-60.0 * t).exp() - depth * 0.01 * 2.0 * t * (1.0 - 2.0 * t).exp(),
+                8.0,
+            )
+        };
+        let [early, late] = [0.5, 2.0].map(|depth| dips(depth)[0].unwrap());
+        assert!(early < 0.1 && late > 0.5, "{early} {late}");
+        assert_eq!([dips(0.9)[0], dips(1.1)[0]], [None; 2]);
+        assert!(dips(1.1)[1].is_some());
     }
 
     #[test]

@@ -60,6 +60,7 @@ struct CellDocument<'a> {
 struct EventDocument {
     t: Numbers,
     discretisation: Numbers,
+    t_limit: Numbers,
 }
 
 /// A row of `groups.csv`.
@@ -196,7 +197,10 @@ impl<'a> Document<'a> {
 impl<'a> CellDocument<'a> {
     fn new(spec: &'a Spec, statistics: &CellStatistics) -> CellDocument<'a> {
         let (cell, counts) = (statistics.cell, statistics.counts);
-        let event = |of: &EventStatistics| EventDocument { t: of.times.numbers(), discretisation: of.errors() };
+        let event = |of: &EventStatistics| {
+            let (t, discretisation) = (of.times.numbers(), of.errors());
+            EventDocument { t, discretisation, t_limit: of.limit() }
+        };
         let events = statistics.events.iter().map(event);
         CellDocument {
             cell,

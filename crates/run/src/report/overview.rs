@@ -194,7 +194,7 @@ impl Overview<'_> {
             let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
             let of_cell = times(self.statistics.times(cell), self.limits_of(cell), "relaxed");
             writeln!(f, "{:<11}{name}: {time} {}{of_cell}", format!("cell {}", cell.cell), unit(self.spec))?;
-            if self.statistics.of_limits {
+            if self.statistics.of_limits && cell.times.mean.is_some() {
                 writeln!(f, "{:<11}t_relax {}", "", raw(&cell.times, self.spec))?;
             }
             let errors = errors(cell, self.spec);
@@ -392,14 +392,14 @@ results    out: summary.csv, run.json
             nodes(&tally)
         };
         assert_eq!(add(0, 100, true), None);
-        assert_eq!(add(1, 100, false).as_deref(), Some("t_error of 1 of 2 members is a wide bound"));
+        assert_eq!(add(1, 100, false).as_deref(), Some("t_error of 1 of 2 members is a bound"));
         assert_eq!(
             add(2, 283, true).as_deref(),
-            Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+            Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a bound")
         );
         assert_eq!(
             add(3, 141, true).as_deref(),
-            Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a wide bound")
+            Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a bound")
         );
     }
 

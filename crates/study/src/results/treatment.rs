@@ -169,8 +169,8 @@ impl FinerMembers {
         let all = format!("{judged} {}", plural(judged, "member"));
         let more = (finer > 0).then(|| format!("{finer} of {all} needed more nodes, up to n = {most}"));
         let open = (bounds > 0).then(|| match finer {
-            0 => format!("t_error of {bounds} of {all} is a wide bound"),
-            _ => format!("t_error of {bounds} is a wide bound"),
+            0 => format!("t_error of {bounds} of {all} is a bound"),
+            _ => format!("t_error of {bounds} is a bound"),
         });
         (finer + bounds > 0).then(|| more.into_iter().chain(open).collect::<Vec<_>>().join("; "))
     }

@@ -91,7 +91,7 @@ impl Spec {
         if conserved == Conserved::AreaAndLength {
             if let (true, Pace::Fixed(_)) = (self.refine, self.pace()) {
                 let problem = format!("what fixed steps leave in the energy at rest is not known, with {given}");
-                return Err(Error::value("refine", true, &problem, "use --adaptive in place of --tau"));
+                return Err(Error::value("refine", true, &problem, "use --adaptive, and no --tau"));
             }
             if let Some(excess) = self.relax_at {
                 let problem = "with area and length the excess stays as it is";

@@ -176,7 +176,11 @@ impl FinishedRun<'_> {
             conditions += &format!("; {} more", spec.event.len() - MAX_CONDITIONS);
         }
         let (title, note) = ("Events", self.note(medium, &joined([conditions, some])));
-        let (share, none) = ("share without the event", "There are no members, so there are no events.");
+        let none = match self.tally.members() {
+            0 => "There are no members, so there are no events.",
+            _ => "No event has statistics, as members were stopped before it when they relaxed.",
+        };
+        let share = "share without the event";
         if spec.event.is_empty() {
             return None;
         }

@@ -106,7 +106,7 @@ impl FinishedRun<'_> {
             header.into_iter().chain(QUANTILES.map(|(_, name, _)| name)).chain(["discretisation %", "raw median"]);
         let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
         let row = |cell: u64, event: &Event, of: &EventStatistics| {
-            let TimeStatistics { sample, mean, quantiles, .. } = of.judged();
+            let (TimeStatistics { mean, quantiles, .. }, sample) = (of.judged(), &of.times.sample);
             let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
             let moments = [
                 mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),

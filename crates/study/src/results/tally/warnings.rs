@@ -37,8 +37,8 @@ impl Tally {
         if self.refined && open > 0 {
             let all = judged().count();
             warnings.push(format!(
-                "t_limit of {open} of {all} {} is the time at the finest level, and t_error a wide bound: their times do not \
-                 converge in n (see `points`){}",
+                "t_limit of {open} of {all} {} goes by a single term of the error, and t_error is a wide bound: their times do \
+                 not converge in n (see `points`){}",
                 plural(all as u64, "member"),
                 if self.has_outlines { "; fewer nodes are enough with a larger --rounding" } else { "" }
             ));
@@ -96,8 +96,8 @@ impl Tally {
         let moving: u64 = some.map(|cell| cell.moving).sum();
         (moving > 0).then(|| {
             format!(
-                "{moving} of {} still moved at their final time: when they relax is not known, and the statistics are \
-                 of the others, mostly the fast ones; {}",
+                "{moving} of {} still moved at their final time, or come back near the threshold of the energy: when they \
+                 relax is not known, and the statistics are of the others, mostly the fast ones; {}",
                 count(self.members(), "member"),
                 self.remedies.of_time()
             )
@@ -133,11 +133,12 @@ impl Tally {
         let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
         let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
         let remedy = self.remedies.of_time();
+        let did = if self.vesicles.contains(&true) { "came to rest" } else { "relaxed" };
         if late.is_empty() {
             return None;
         }
         if self.cells.len() == 1 {
-            return Some(format!("no member relaxed before its final time; {remedy}"));
+            return Some(format!("no member {did} before its final time; {remedy}"));
         }
         let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
         if late.len() > NAMED_CELLS {
@@ -145,7 +146,7 @@ impl Tally {
         }
         let (cells, all) = (late.len(), self.cells.len());
         Some(format!(
-            "no member relaxed before its final time in {cells} of {all} cells ({}); {remedy}",
+            "no member {did} before its final time in {cells} of {all} cells ({}); {remedy}",
             named.join("; ")
         ))
     }
@@ -175,8 +176,8 @@ mod tests {
             |of: &Tally, cell: usize| of.cells[cell].times.iter().map(|seen| seen.time).collect::<Vec<_>>();
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
-        let warning = "2 of 3 members still moved at their final time: when they relax is not known, and the statistics \
-                       are of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
+        let warning = "2 of 3 members still moved at their final time, or come back near the threshold of the energy: \
+                       when they relax is not known, and the statistics are of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
         // The control: members with one of the two are censored, in a sweep, too.
         let sweep = "flow = 'willmore'\n[sweep]\nconserve = ['area', 'area,length']";
