@@ -64,7 +64,7 @@ impl Remedies {
     /// Of members whose time was up.
     pub(super) fn of_time(&self) -> &'static str {
         match (self.keeps_both, self.stops) {
-            (true, _) => "use a longer --t-end, or a larger --relax-to",
+            (true, _) => "use a longer --t-end, or another --relax-to",
             (false, true) => "use a longer --t-end, or a larger --relax-to or --relax-at",
             (false, false) => "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at",
         }
@@ -98,7 +98,7 @@ mod tests {
     #[test]
     fn a_vesicle_has_no_relax_at() {
         let vesicle = "flow = 'willmore'\nconserve = 'area,length'\nt-end = 'auto'";
-        assert_eq!(of(vesicle).of_time(), "use a longer --t-end, or a larger --relax-to");
+        assert_eq!(of(vesicle).of_time(), "use a longer --t-end, or another --relax-to");
         assert!(of("").of_time().contains("--t-end auto") && !of("t-end = 'auto'").of_time().contains("--t-end auto"));
     }
 }

@@ -133,7 +133,10 @@ impl Tally {
         let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
         let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
         let remedy = self.remedies.of_time();
-        let did = if self.vesicles.contains(&true) { "came to rest" } else { "relaxed" };
+        let did = match self.vesicles.contains(&true) {
+            true => "came to rest, or stayed away from the threshold of the energy,",
+            false => "relaxed",
+        };
         if late.is_empty() {
             return None;
         }
@@ -177,7 +180,7 @@ mod tests {
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
         let warning = "2 of 3 members still moved at their final time, or come back near the threshold of the energy: \
-                       when they relax is not known, and the statistics are of the others, mostly the fast ones; use a longer --t-end, or a larger --relax-to";
+                       when they relax is not known, and the statistics are of the others, mostly the fast ones; use a longer --t-end, or another --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
         // The control: members with one of the two are censored, in a sweep, too.
         let sweep = "flow = 'willmore'\n[sweep]\nconserve = ['area', 'area,length']";
