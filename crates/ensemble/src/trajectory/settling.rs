@@ -52,17 +52,27 @@ impl Settling {
         let late = left.iter().filter(|[t, _]| *t >= 0.5 * t_end * (1.0 - 1e-9));
         let settled = late.map(|[_, left]| left.abs()).fold(0.0, f64::max) <= AT_REST * self.share;
         // The end itself is the last.
-        let within = |share| if is_steady(share, &left) { settles_within(share, &left) } else { None };
+        let rounding = NO_CHANGE * end.abs() / farthest;
+        let within = |share| if is_steady(share, &left, rounding) { settles_within(share, &left) } else { None };
         if settled { [self.share, 0.5].map(within) } else { [None; 2] }
     }
 }
 
-/// Whether a number settles within `share` of 0 at about the time at which it does within a share that is a little
-/// larger or smaller.
-fn is_steady(share: f64, values: &[[f64; 2]]) -> bool {
-    let last_beyond = |factor: f64| values.iter().rposition(|[_, value]| value.abs() > factor * share).unwrap_or(0);
-    let [from, to] = [1.0 + NEAR, 1.0 - NEAR].map(last_beyond);
-    values[from..=to].windows(2).all(|pair| pair[1][1].abs() <= pair[0][1].abs())
+/// Whether a number settles within `share` of 0 on the way on which it does within a share that is a little larger or
+/// smaller: between these two it neither grows by more than `rounding` nor changes its sign.
+fn is_steady(share: f64, values: &[[f64; 2]], rounding: f64) -> bool {
+    let last_beyond = |factor: f64| values.iter().rposition(|[_, value]| value.abs() > factor * share);
+    // Nothing may be beyond a large share; then it falls from its largest distance.
+    let farthest = || (0..values.len()).max_by(|i, j| values[*i][1].abs().total_cmp(&values[*j][1].abs()));
+    let (Some(from), Some(to)) = (last_beyond(1.0 + NEAR).or_else(farthest), last_beyond(1.0 - NEAR)) else {
+        return true;
+    };
+    let mut least = f64::INFINITY;
+    values.get(from..=to).unwrap_or_default().iter().all(|[_, value]| {
+        let is_steady = value.abs() <= least + rounding && value * values[from][1] > 0.0;
+        least = least.min(value.abs());
+        is_steady
+    })
 }
 
 /// From when on a number stays within `share` of 0, of its `values` at times: the time is a cubic in the logarithms of
@@ -139,6 +149,20 @@ mod tests {
         assert!(early < 0.1 && late > 0.5, "{early} {late}");
         assert_eq!([dips(0.9)[0], dips(1.1)[0]], [None; 2]);
         assert!(dips(1.1)[1].is_some());
+    }
+
+    #[test]
+    fn rounding_on_a_plateau_is_no_return_and_a_leap_over_the_end_is() {
+        let values: Vec<[f64; 2]> = [1.0, 0.02, 0.013, -0.0095, -0.0092, -0.008, -0.001].map(|left| [0.0, left]).into();
+        assert!(!is_steady(0.01, &values, 1e-6));
+        let plateau = |noise: f64| {
+            settling(
+                |t| 3.0 + 0.5 * (-40.0 * t).exp() + 0.5 * (-(t / 2.0).powi(8)).exp() + noise * (1e3 * t).sin(),
+                8.0,
+            )
+        };
+        assert!(plateau(0.0)[1].is_some() && plateau(1e-8)[1].is_some(), "{:?}", plateau(1e-8));
+        assert_eq!(plateau(1e-3)[1], None);
     }
 
     #[test]
