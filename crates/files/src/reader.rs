@@ -476,7 +476,7 @@ pub fn explained(
             let times = of_limits.then_some(t_limit).into_iter().chain([t_relax, t_half]).chain(of_events).collect();
             let numbers = (0..count).map(|_| fields.known()).collect::<Result<_>>()?;
             let place = member.saturating_sub(cell.saturating_mul(spec.curves));
-            // Of a vesicle that still moves at the end nothing is known.
+            // Of a vesicle without a relaxation time nothing is known.
             let later_than = if spec.has_vesicles_in(cell) { t_relax.unwrap_or(f64::NAN) } else { t_end };
             explaining.add(FeaturedMember { member, cell, place, numbers, times, later_than });
         } else if explaining.is_full() {

@@ -30,7 +30,7 @@ columns! { Outcome:
     rejected: whole = rejected, "adaptive steps that were refused";
     sweeps_k: whole = sweeps_k, "sweeps on the curvature systems, 0 with the direct solver";
     sweeps_x: whole = sweeps_x, "sweeps on the position systems";
-    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` the time from which on the energy stays within this share of the largest distance that it had from its end";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` the time from which on the energy stays within this share of the largest distance that it had from its end, empty if it comes back near it";
     t_half: event = t_half, "first time at which the excess reaches half its start; with `--conserve area,length` likewise by the energy";
     rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
     rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
@@ -201,7 +201,7 @@ columns! { ExplainedRow:
     time: word = time, "what is explained: t_limit with `--refine`, t_relax, t_half, or the name of an event";
     feature: word = feature, "a column of `members.csv`, best first; or together: a regression on the chosen ones";
     members: whole = members, "members that reached the time";
-    censored: whole = censored, "members without it: they ended before, or are vesicles that still moved at the end";
+    censored: whole = censored, "members without it: they ended before, or are vesicles without a relaxation time";
     spearman: optional = spearman, "rank correlation of feature and time";
     r2: optional = r2, "share of the variance of the time that a straight line explains; of the regression cross-validated";
     chosen: rank = chosen, "place of the feature in the regression, from 1, empty if it is not in it; of the regression how many it has";

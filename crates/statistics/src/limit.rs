@@ -140,7 +140,7 @@ impl Limit {
         Limit { t, error, fixed: rounding, order, asymptotic, relative: own / t - 1.0 }
     }
 
-    /// The limit of what holds at the start with any number of nodes.
+    /// The limit of what holds at the start, time 0, with any number of nodes. It is exact.
     pub const AT_START: Limit = Limit { t: 0.0, error: 0.0, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
 
     /// Whether its differences do not fall as they should, and it is not known to a thousandth.

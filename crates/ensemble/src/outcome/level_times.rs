@@ -97,8 +97,9 @@ impl Ladder {
         Ladder { levels, times, precisions }
     }
 
-    /// What it tells of the time `own` at the nodes of `spec`, judged as `of`, with the curve at its finest level;
-    /// nothing if it is too short, does not have these nodes, or the time is 0 at some levels only.
+    /// What it tells of the time `own` at the nodes of `spec`, judged as `of`, with the curve at its finest level. A
+    /// time that is 0 at these nodes and at all finer levels has the limit 0. There is none if the ladder is too short,
+    /// does not have these nodes, the time is 0 at some of its levels only, or tends below 0.
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
@@ -124,7 +125,7 @@ impl Ladder {
         let levels = times;
         let limit =
             Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess });
-        // An event right after the start of a curve that its nodes do not resolve may have none that is a time.
+        // What happens right after the start of a curve that its nodes do not resolve may tend below 0.
         (limit.t > 0.0 && limit.error.is_finite()).then_some(limit)
     }
 }
@@ -162,7 +163,8 @@ impl LevelTimes {
     }
 
     /// Whether `member`, of a cell of `spec`, is to run at `level`, one of the finer ones, by its own times at those
-    /// below: it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more).
+    /// below: it has a time at the last of them, and no limit yet, or one that [needs more](Limit::needs_more). A time
+    /// that is 0 there needs none.
     ///
     /// At the level of a variation it is to run if it has its finest time there, whose limit that will be.
     pub fn needs(&self, spec: &Spec, member: u64, level: RefinementLevel) -> bool {
@@ -174,8 +176,9 @@ impl LevelTimes {
         let Some(finest) = self.at(top, member) else { return false };
         EndTime::ALL.into_iter().any(|of| {
             let ladder = Ladder::up_to(top, |level| self.time(of, level, member));
+            let is_later = ladder.times.last().is_some_and(|t| *t > 0.0);
             let own = self.time(of, RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0);
-            let Some((own, _)) = own.filter(|_| !ladder.levels.is_empty()) else { return false };
+            let Some((own, _)) = own.filter(|_| is_later) else { return false };
             // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
             let limit = ladder.limit(spec, own, finest, of);
             limit.is_none_or(|limit| limit.needs_more(turn(spec, finest)))

@@ -205,7 +205,7 @@ impl Spec {
     }
 
     /// Whether both area and length are kept, in any cell.
-    fn has_vesicles(&self) -> bool {
+    pub fn has_vesicles(&self) -> bool {
         let both = Conserved::AreaAndLength;
         let swept = self.sweep.axes().iter().filter(|axis| axis.key == "conserve").flat_map(SweepAxis::labels);
         self.conserve == Some(both) || swept.into_iter().any(|value| value.parse() == Ok(both))

@@ -4,7 +4,7 @@
 //! only at the end. The energy is therefore recorded at times that are dense from early to late ones, and when the
 //! final time has come, t_relax is the time from which on it stays within a share of the largest distance that it had
 //! from its end. Willmore flow lowers it all the way, and that distance is the one at the start; poly need not. It has
-//! no t_relax if the energy still moves by then.
+//! no t_relax if the energy still moves by then, or if it comes back near that share.
 
 use crate::{Observables, Spec};
 
@@ -42,7 +42,7 @@ impl Settling {
     }
 
     /// When it was relaxed and from when on less than half of its largest distance was left, for this energy at the
-    /// final time; nothing if that still moves.
+    /// final time. Neither is known if that still moves, and each only if its share is crossed on one way.
     pub(super) fn times(&self, t_end: f64, end: f64) -> [Option<f64>; 2] {
         let farthest = self.energies.iter().map(|[_, energy]| (energy - end).abs()).fold(0.0, f64::max);
         if farthest <= NO_CHANGE * end.abs() {

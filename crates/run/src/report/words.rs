@@ -269,7 +269,9 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
             format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
         () if spec.refine => ": t_limit is free of it".into(),
-        () if larger && spec.keeps_both() => " dominates; more --points lessen it, or --accurate in f64".into(),
+        () if larger && spec.has_vesicles_in(cell.cell) => {
+            " dominates; more --points lessen it, or --accurate in f64".into()
+        }
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => " dominates; add --refine to remove it".into(),
         () if larger => " dominates; add --accurate to remove it".into(),
         () => String::new(),

@@ -16,7 +16,7 @@ pub(super) struct Remedies {
     adaptive: bool,
     pulled: bool,
     driven: bool,
-    keeps_both: bool,
+    vesicles: bool,
     stops: bool,
 }
 
@@ -28,7 +28,7 @@ impl Remedies {
             adaptive: matches!(spec.pace(), Pace::Adaptive(_)),
             pulled: spec.pull != Pull::Rate(0.0),
             driven: spec.sweep.has("drive") || spec.drive.as_ref().is_some_and(is_inwards),
-            keeps_both: spec.keeps_both(),
+            vesicles: spec.has_vesicles(),
             stops: spec.stops_when_relaxed(),
         }
     }
@@ -63,7 +63,7 @@ impl Remedies {
 
     /// Of members whose time was up.
     pub(super) fn of_time(&self) -> &'static str {
-        match (self.keeps_both, self.stops) {
+        match (self.vesicles, self.stops) {
             (true, _) => "use a longer --t-end, or another --relax-to",
             (false, true) => "use a longer --t-end, or a larger --relax-to or --relax-at",
             (false, false) => "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at",

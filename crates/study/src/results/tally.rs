@@ -339,13 +339,18 @@ impl Tally {
         }
     }
 
+    /// Whether the members of a cell keep area and length.
+    fn is_vesicle(&self, cell: u64) -> bool {
+        self.vesicles.get(cell as usize).copied().unwrap_or_default()
+    }
+
     /// Adds a member.
     ///
     /// # Errors
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
         let (cell, refined) = (outcome.cell as usize, self.refined);
-        let vesicles = self.vesicles.get(cell).copied().unwrap_or_default();
+        let vesicles = self.is_vesicle(cell as u64);
         let counted = Counted { refined, stops: self.stops, driven: self.driven, vesicles };
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);

@@ -191,7 +191,10 @@ impl FinishedRun<'_> {
         }
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
-            Some(_) => "a lower bound: some members had not relaxed at the end, or have no limit".into(),
+            Some(_) if cell.limits.is_some() => {
+                "a lower bound: some members had not relaxed at the end, or have no limit".into()
+            }
+            Some(_) => "a lower bound: some members had not relaxed at the end".into(),
             None => error.map_or(String::new(), |error| format!("standard error {}", significant(error, 2))),
         };
         let mut headline = vec![

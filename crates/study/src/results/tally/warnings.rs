@@ -96,7 +96,7 @@ impl Tally {
         let moving: u64 = some.map(|cell| cell.moving).sum();
         (moving > 0).then(|| {
             format!(
-                "{moving} of {} still moved at their final time, or come back near the threshold of the energy: when they \
+                "{moving} of {} still moved at their final time, or came back near the threshold of the energy: when they \
                  relax is not known, and the statistics are of the others, mostly the fast ones; {}",
                 count(self.members(), "member"),
                 self.remedies.of_time()
@@ -128,30 +128,35 @@ impl Tally {
         kinds.filter(|(.., without)| *without > 0).map(told).collect()
     }
 
-    /// The warning about cells in which no member relaxed, because the final time came first.
-    fn late(&self) -> Option<String> {
+    /// The warnings about cells in which no member relaxed, because the final time came first; of cells of vesicles
+    /// one of their own.
+    fn late(&self) -> Vec<String> {
         let is_late = |cell: &CellTally| cell.late > 0 && cell.counts[RELAXED] == 0;
-        let late: Vec<u64> = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank).collect();
-        let remedy = self.remedies.of_time();
-        let did = match self.vesicles.contains(&true) {
-            true => "came to rest, or stayed away from the threshold of the energy,",
-            false => "relaxed",
+        let late = |vesicles: bool| {
+            let cells = (0..).zip(&self.cells).filter(|(_, cell)| is_late(cell)).map(|(rank, _)| rank);
+            cells.filter(move |rank| self.is_vesicle(*rank) == vesicles).collect::<Vec<u64>>()
         };
-        if late.is_empty() {
-            return None;
-        }
-        if self.cells.len() == 1 {
-            return Some(format!("no member {did} before its final time; {remedy}"));
-        }
-        let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
-        if late.len() > NAMED_CELLS {
-            named.push(format!("{} more", late.len() - NAMED_CELLS));
-        }
-        let (cells, all) = (late.len(), self.cells.len());
-        Some(format!(
-            "no member {did} before its final time in {cells} of {all} cells ({}); {remedy}",
-            named.join("; ")
-        ))
+        let kinds = [
+            (late(false), "relaxed before its final time", ""),
+            (
+                late(true),
+                "has a relaxation time",
+                ": the energy still moved at the end, or came back near the threshold",
+            ),
+        ];
+        let told = |(late, did, why): (Vec<u64>, &str, &str)| {
+            let remedy = self.remedies.of_time();
+            let (cells, all) = (late.len(), self.cells.len());
+            if all == 1 {
+                return format!("no member {did}{why}; {remedy}");
+            }
+            let mut named: Vec<String> = late.iter().take(NAMED_CELLS).map(|rank| self.sweep.name(*rank)).collect();
+            if cells > NAMED_CELLS {
+                named.push(format!("{} more", cells - NAMED_CELLS));
+            }
+            format!("no member {did} in {cells} of {all} cells ({}){why}; {remedy}", named.join("; "))
+        };
+        kinds.into_iter().filter(|(late, ..)| !late.is_empty()).map(told).collect()
     }
 }
 
@@ -179,7 +184,7 @@ mod tests {
             |of: &Tally, cell: usize| of.cells[cell].times.iter().map(|seen| seen.time).collect::<Vec<_>>();
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
-        let warning = "2 of 3 members still moved at their final time, or come back near the threshold of the energy: \
+        let warning = "2 of 3 members still moved at their final time, or came back near the threshold of the energy: \
                        when they relax is not known, and the statistics are of the others, mostly the fast ones; use a longer --t-end, or another --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
         // The control: members with one of the two are censored, in a sweep, too.
@@ -188,6 +193,14 @@ mod tests {
         let both = of(sweep, &[&own()[..], &others].concat());
         assert_eq!((later_than(&both, 0), later_than(&both, 1)), (vec![2.0, 0.5, 2.0], vec![0.0, 0.5, 0.0]));
         assert_eq!((both.named[0].later_than, both.named[3].later_than), (Some(2.0), None));
+        let [first, ..] = own();
+        let unfinished = [0, 1].map(|cell| Outcome { member: cell, cell, ..first.clone() });
+        let late = [
+            "no member relaxed before its final time in 1 of 2 cells (conserve = area); use a longer --t-end, or another --relax-to",
+            "no member has a relaxation time in 1 of 2 cells (conserve = area,length): the energy still moved at the end, or \
+             came back near the threshold; use a longer --t-end, or another --relax-to",
+        ];
+        assert_eq!(of(sweep, &unfinished).warnings(), late);
     }
 
     #[test]
