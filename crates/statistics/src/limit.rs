@@ -6,7 +6,8 @@
 //! curve it goes with h, and where θ is not small, n nodes do not resolve the curve, whatever the differences of the
 //! times say. A weak mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. ρ is
 //! therefore the larger of θ² and a multiple of the ratio of the two terms. From the term in h⁴ what is left is about
-//! `ρ·|term in h⁴|`, from that in h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance.
+//! `ρ·|term in h⁴|`, from that in h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance. A fourth resolution
+//! shows the term in h⁶ itself, by what it changes in the limit.
 //!
 //! The steps in time leave a part that goes with their tolerance, so a ninth of what ten times more exact steps change
 //! is what these leave themselves. It is removed. What remains goes with that change, or with the tolerance over the
@@ -38,6 +39,11 @@ const OF_DIFFERENCES: f64 = 1.5;
 /// those of levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
 const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
+/// With a fourth level the limit of the three below the finest is known, too. Its error is 8 times as large, so that the
+/// two limits differ by 7 times the error of the finer: of their difference this is a part. The rest is a share of the
+/// error by three levels, since limits may agree by chance.
+const OF_CHANGE: f64 = 0.25;
+const OF_THREE: f64 = 0.25;
 /// How much more exact the steps of the levels are than those of the member.
 pub const FINER_STEPS: f64 = 10.0;
 /// The error of steps as a share of what these change, for times at which an excess is reached.
@@ -121,17 +127,22 @@ impl Limit {
         let Times { own, ref levels, ref points, ref rounding, own_level, tolerance, share_of_steps, turn, excess } =
             *times;
         let finest = points[points.len() - 1];
-        let three = |from: usize| {
+        let of_three = |from: usize| {
             let at = [0, 1, 2].map(|i| from + i);
             let (points, rounding) = (at.map(|i| points[i]), at.map(|i| rounding[i] * levels[i]));
             OfSpace::of(at.map(|i| levels[i]), points, rounding, turn * finest as f64 / points[2] as f64)
         };
-        let mut of_space = (0..levels.len() - 2).rev().map(three);
-        let OfSpace { t, error, rounding, order, asymptotic } = of_space.next().expect("three levels");
+        let of_space: Vec<OfSpace> = (0..levels.len() - 2).rev().map(of_three).collect();
+        let OfSpace { t, three, error, rounding, order, asymptotic } = of_space[0];
         let fall = if asymptotic { FALL } else { OPEN_FALL };
         // What is small at the finest levels alone may be so by chance.
         let scales = std::iter::successors(Some(1.0 / fall), |scale| Some(scale / fall));
-        let error = of_space.zip(scales).map(|(coarser, scale)| scale * coarser.error).fold(error, f64::max);
+        let promised = of_space[1..].iter().zip(scales).map(|(coarser, scale)| scale * coarser.error);
+        let error = promised.fold(error, f64::max);
+        let error = match of_space.get(1) {
+            Some(coarser) if asymptotic => error.min(OF_CHANGE * (three - coarser.three).abs() + OF_THREE * error),
+            _ => error,
+        };
         let full = levels[levels.len() - 1];
         let change = if share_of_steps.is_some() { own - levels[own_level] } else { 0.0 };
         let t = t - change / (FINER_STEPS - 1.0);
@@ -175,6 +186,8 @@ impl Limit {
 /// What three levels tell of a limit.
 struct OfSpace {
     t: f64,
+    /// Without the terms in h² and h⁴, asymptotic or not.
+    three: f64,
     error: f64,
     /// By how much rounding moves it.
     rounding: f64,
@@ -213,7 +226,7 @@ impl OfSpace {
             let few_nodes_explain = !is_resolved && falls_by(LOOSE_ORDERS);
             (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) }, moved_two)
         };
-        OfSpace { t, error, rounding, order, asymptotic }
+        OfSpace { t, three, error, rounding, order, asymptotic }
     }
 }
 
@@ -317,6 +330,21 @@ mod tests {
         }
         assert_eq!(limit(|h| 2.0 + 40.0 * (h - 0.013).abs()).order, None);
         assert!((limit(|h| 2.0 + 0.5 * h).order.unwrap() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_fourth_level_shortens_the_error_but_never_to_nothing() {
+        let fall = |h: f64| (80.0 * h).powi(2);
+        let at = |h: f64| 2.0 + 0.05 * fall(h) * (1.0 + 0.2 * fall(h) + 0.03 * fall(h).powi(2));
+        let [four, three] = [&[71, 100, 141, 200][..], &[100, 141, 200]].map(|points| {
+            let levels: Vec<f64> = points.iter().map(|n| at(1.0 / *n as f64)).collect();
+            let (own, rounding, own_level, tolerance) = (levels[0], vec![0.0; levels.len()], 0, 1e-6);
+            let (points, share_of_steps, turn, excess) = (points.to_vec(), Some(SHARE_OF_STEPS), 0.4, 2e-3);
+            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+        });
+        assert!(four.asymptotic && (four.t - three.t).abs() < 1e-12, "{four:?} {three:?}");
+        assert!(four.error < 0.6 * three.error && (four.t - 2.0).abs() < four.error, "{four:?} {three:?}");
+        assert!(four.error > OF_THREE * three.error, "{four:?} {three:?}");
     }
 
     #[test]
