@@ -84,6 +84,8 @@ pub struct Times {
     pub turn: f64,
     /// The excess at that time, or a smaller one.
     pub excess: f64,
+    /// Whether the terms are those of a plain curve, with no waves of γ or M, of which more levels tell more.
+    pub is_plain: bool,
 }
 
 /// What the time tends to.
@@ -114,9 +116,9 @@ impl Limit {
     /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
     /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
     /// let (own, own_level, tolerance, share_of_steps) = (0.804, 2, 1e-4, Some(SHARE_OF_STEPS));
-    /// let (turn, excess) = (0.2, 2e-3);
+    /// let (turn, excess, is_plain) = (0.2, 2e-3, true);
     /// let limit =
-    ///     Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess });
+    ///     Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess, is_plain });
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
     /// ```
@@ -124,8 +126,18 @@ impl Limit {
     /// # Panics
     /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
-        let Times { own, ref levels, ref points, ref rounding, own_level, tolerance, share_of_steps, turn, excess } =
-            *times;
+        let Times {
+            own,
+            ref levels,
+            ref points,
+            ref rounding,
+            own_level,
+            tolerance,
+            share_of_steps,
+            turn,
+            excess,
+            is_plain,
+        } = *times;
         let finest = points[points.len() - 1];
         let of_three = |from: usize| {
             let at = [0, 1, 2].map(|i| from + i);
@@ -140,7 +152,9 @@ impl Limit {
         let promised = of_space[1..].iter().zip(scales).map(|(coarser, scale)| scale * coarser.error);
         let error = promised.fold(error, f64::max);
         let error = match of_space.get(1) {
-            Some(coarser) if asymptotic => error.min(OF_CHANGE * (three - coarser.three).abs() + OF_THREE * error),
+            Some(coarser) if asymptotic && is_plain => {
+                error.min(OF_CHANGE * (three - coarser.three).abs() + OF_THREE * error)
+            }
             _ => error,
         };
         let full = levels[levels.len() - 1];
@@ -271,7 +285,18 @@ mod tests {
         let (own, points) = (levels[2], points.to_vec());
         let (rounding, tolerance, excess) = (vec![0.0; levels.len()], 1e-4, 2e-3);
         let (own_level, share_of_steps) = (2, Some(SHARE_OF_STEPS));
-        Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+        Limit::of(&Times {
+            own,
+            levels,
+            points,
+            rounding,
+            own_level,
+            tolerance,
+            share_of_steps,
+            turn,
+            excess,
+            is_plain: true,
+        })
     }
 
     /// A time whose terms fall by the square of the angle at a node of `n` nodes.
@@ -340,7 +365,18 @@ mod tests {
             let levels: Vec<f64> = points.iter().map(|n| at(1.0 / *n as f64)).collect();
             let (own, rounding, own_level, tolerance) = (levels[0], vec![0.0; levels.len()], 0, 1e-6);
             let (points, share_of_steps, turn, excess) = (points.to_vec(), Some(SHARE_OF_STEPS), 0.4, 2e-3);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+            Limit::of(&Times {
+                own,
+                levels,
+                points,
+                rounding,
+                own_level,
+                tolerance,
+                share_of_steps,
+                turn,
+                excess,
+                is_plain: true,
+            })
         });
         assert!(four.asymptotic && (four.t - three.t).abs() < 1e-12, "{four:?} {three:?}");
         assert!(four.error < 0.6 * three.error && (four.t - 2.0).abs() < four.error, "{four:?} {three:?}");
@@ -363,16 +399,36 @@ mod tests {
         let (own, levels) = (31.82330, vec![31.81772, 31.82203, 31.82330]);
         let (points, tolerance, excess, share_of_steps) = (vec![53, 75, 106], 1e-4, 0.012, Some(SHARE_OF_STEPS));
         let rounding = vec![0.0; 3];
-        let times =
-            Times { own, levels, points, rounding, own_level: 2, tolerance, share_of_steps, turn: 1.36, excess };
+        let times = Times {
+            own,
+            levels,
+            points,
+            rounding,
+            own_level: 2,
+            tolerance,
+            share_of_steps,
+            turn: 1.36,
+            excess,
+            is_plain: true,
+        };
         let chance = Limit::of(&times);
         assert!(chance.relative_error() < WIDE && chance.needs_more(1.36) && !chance.needs_more(0.69), "{chance:?}");
         // A time that passes its largest value between levels has no order.
         let levels = vec![1.000672, 1.001219, 1.001099];
         let (points, tolerance, excess) = (vec![40, 57, 80], 1e-4, 0.012);
         let (own, rounding) = (levels[2], vec![0.0; 3]);
-        let times =
-            Times { own, levels, points, rounding, own_level: 2, tolerance, share_of_steps, turn: 0.65, excess };
+        let times = Times {
+            own,
+            levels,
+            points,
+            rounding,
+            own_level: 2,
+            tolerance,
+            share_of_steps,
+            turn: 0.65,
+            excess,
+            is_plain: true,
+        };
         let turned = Limit::of(&times);
         assert!(turned.order.is_none() && turned.needs_more(0.65) && !turned.asymptotic, "{turned:?}");
     }
@@ -388,8 +444,19 @@ mod tests {
         let at = |excess: f64, tolerance: f64| {
             let (own, levels, points, rounding) = (2.0, vec![2.0; 3], POINTS.to_vec(), vec![0.0; 3]);
             let (own_level, share_of_steps, turn) = (2, Some(SHARE_OF_STEPS), 0.1);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
-                .error
+            Limit::of(&Times {
+                own,
+                levels,
+                points,
+                rounding,
+                own_level,
+                tolerance,
+                share_of_steps,
+                turn,
+                excess,
+                is_plain: true,
+            })
+            .error
         };
         let (one, small, exact) = (at(1e-2, 1e-4), at(1e-4, 1e-4), at(1e-2, 1e-5));
         // Equal times leave the rounding of their extrapolation, some 1e-16.
@@ -402,7 +469,18 @@ mod tests {
         let at = |share_of_steps: Option<f64>| {
             let (own, levels, points, rounding) = (levels[2] + 0.009, levels.clone(), POINTS.to_vec(), vec![0.0; 3]);
             let (own_level, tolerance, turn, excess) = (2, 1e-4, 0.1, 1e-2);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+            Limit::of(&Times {
+                own,
+                levels,
+                points,
+                rounding,
+                own_level,
+                tolerance,
+                share_of_steps,
+                turn,
+                excess,
+                is_plain: true,
+            })
         };
         let [adaptive, other] = [Some(SHARE_OF_STEPS), None].map(at);
         assert!((adaptive.t - 2.0).abs() < 1e-12 && (other.t - 2.001).abs() < 1e-12, "{adaptive:?} {other:?}");
@@ -416,7 +494,18 @@ mod tests {
             let levels = [50, 71, 100].iter().zip(by).map(|(n, by)| exact(*n) * (1.0 + by)).collect();
             let (own, points, rounding) = (exact(100), POINTS.to_vec(), vec![rounding; 3]);
             let (own_level, tolerance, share_of_steps, turn, excess) = (2, 1e-4, None, 0.2, 2e-3);
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess })
+            Limit::of(&Times {
+                own,
+                levels,
+                points,
+                rounding,
+                own_level,
+                tolerance,
+                share_of_steps,
+                turn,
+                excess,
+                is_plain: true,
+            })
         };
         let (moved, blind) = (at([1e-4, -1e-4, 1e-4], 1e-4), at([1e-4, -1e-4, 1e-4], 0.0));
         assert!(

@@ -122,9 +122,19 @@ impl Ladder {
         let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
         let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
-        let levels = times;
-        let limit =
-            Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess });
+        let (levels, is_plain) = (times, spec.turns() == 1.0 && !spec.has_crystals());
+        let limit = Limit::of(&Times {
+            own,
+            levels,
+            points,
+            rounding,
+            own_level,
+            tolerance,
+            share_of_steps,
+            turn,
+            excess,
+            is_plain,
+        });
         // What happens right after the start of a curve that its nodes do not resolve may tend below 0.
         (limit.t > 0.0 && limit.error.is_finite()).then_some(limit)
     }
