@@ -39,9 +39,9 @@ const OF_DIFFERENCES: f64 = 1.5;
 /// those of levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
 const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
-/// With a fourth level the limit of the three below the finest is known, too. Its error is 8 times as large, so that the
-/// two limits differ by 7 times the error of the finer: of their difference this is a part. The rest is a share of the
-/// error by three levels, since limits may agree by chance.
+/// With a fourth level the limit of the three below the finest is known, too. Its error is 8 times as large, so the two
+/// limits differ by 7 times the error of the finer: of their difference this is a part. The rest is a share of the error
+/// by three levels, since limits may agree by chance.
 const OF_CHANGE: f64 = 0.25;
 const OF_THREE: f64 = 0.25;
 /// How much more exact the steps of the levels are than those of the member.
@@ -117,8 +117,9 @@ impl Limit {
     /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
     /// let (own, own_level, tolerance, share_of_steps) = (0.804, 2, 1e-4, Some(SHARE_OF_STEPS));
     /// let (turn, excess, is_plain) = (0.2, 2e-3, true);
-    /// let limit =
-    ///     Limit::of(&Times { own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess, is_plain });
+    /// let limit = Limit::of(&Times {
+    ///     own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess, is_plain,
+    /// });
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
     /// ```
