@@ -40,8 +40,8 @@ const OF_DIFFERENCES: f64 = 1.5;
 const FALL: f64 = 32.0;
 const OPEN_FALL: f64 = 4.0;
 /// With a fourth level the limit of the three below the finest is known, too. Its error is 8 times as large, so the two
-/// limits differ by 7 times the error of the finer: of their difference this is a part. The rest is a share of the error
-/// by three levels, since limits may agree by chance.
+/// limits differ by 7 times the error of the finer: of their difference this is a part. The rest is a share of the
+/// error by three levels, since limits may agree by chance.
 const OF_CHANGE: f64 = 0.25;
 const OF_THREE: f64 = 0.25;
 /// How much more exact the steps of the levels are than those of the member.
