@@ -55,7 +55,7 @@ direct, and minutes with sweeps.
 --referee solves the same flow by tangent angle and length, with Fourier coefficients and steps of order 8, twice, until
 both solutions agree to 1e-6. It refuses curves with corners and curves that become singular. For one curve the table has
 t_relax at n = 50, 100 and 200 (adaptive steps, 1e-5), whose error should fall at order 2, and t_limit; with --curves it has
-the t_limit of every member. The error of t_limit is also missing_letters in bars, its half-width t_error.";
+the t_limit of every member. The error of t_limit is also given in bars, its half-width t_error.";
 
 /// Solve problems with exact solutions; print errors and observed orders as a table.
 #[derive(clap::Args)]
