@@ -344,6 +344,19 @@ mod tests {
     }
 
     #[test]
+    fn a_time_of_0_at_the_finest_level_asks_for_no_more() {
+        let spec = Spec::from_toml("adaptive = 1e-3\nrefine = true").unwrap();
+        let needs = |last: f64| {
+            let mut times = LevelTimes::default();
+            for (level, t) in (1..).zip([0.3, 0.2, 0.1, last]) {
+                times.add(&LevelRow { level, t_relax: Some(t), excess_start: 0.2, ..LevelRow::default() }).unwrap();
+            }
+            times.needs(&spec, 0, RefinementLevel::of_number(5).unwrap())
+        };
+        assert!(!needs(0.0) && needs(0.04));
+    }
+
+    #[test]
     fn times_that_tend_below_0_have_no_limit() {
         let spec = Spec::from_toml("points = 100\nadaptive = 1e-3\nrefine = true").unwrap();
         let limit = |at_infinity: f64| {

@@ -161,7 +161,7 @@ mod tests {
                 8.0,
             )
         };
-        assert!(plateau(0.0)[1].is_some() && plateau(1e-8)[1].is_some(), "{:?}", plateau(1e-8));
+        assert!(plateau(0.0)[1].is_some() && plateau(1e-6)[1].is_some(), "{:?}", plateau(1e-6));
         assert_eq!(plateau(1e-3)[1], None);
     }
 
