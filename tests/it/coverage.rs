@@ -1,14 +1,15 @@
 //! Whether `t_limit ± t_error` holds the true limit: of ensembles that were not used to find the rule, against the
-//! referee.
+//! referee, and that of events against four times the nodes.
 //!
 //! `CURVELAX_FAMILIES=SEED,MEMBERS tests/run --test it -- coverage --nocapture` draws other families, with so many
-//! members each, and prints a line for each of them.
+//! members each, and prints a line for each of them and of their events.
 
 use std::env;
 
 use curvelax::{
-    ensemble::Spec,
+    ensemble::{Ended, Spec, Study},
     random::Stream,
+    relax,
     truth::{RefereeRow, limits},
 };
 
@@ -19,6 +20,26 @@ const MEMBERS: u64 = 6;
 const ALL_MEMBERS: u64 = 60;
 /// A limit may be off by so many of its half-widths.
 const WORST: f64 = 3.0;
+/// Seed and members of families for their events.
+const SEED_OF_EVENTS: u64 = 412;
+const MEMBERS_OF_EVENTS: u64 = 2;
+/// Those of docs/internals/method.md#limit-of-events.
+const EVENTS: [&str; 12] = [
+    "length <= 0.99 * start",
+    "excess <= 0.9 * start",
+    "excess <= 0.5 * start",
+    "area >= 1.01 * start",
+    "energy <= 0.9 * start",
+    "energy <= 0.5 * start",
+    "k_max <= 0.9 * start",
+    "k_max <= 0.7 * start",
+    "k_max <= 1.2",
+    "k_min >= 0",
+    "k_min >= 0.3",
+    "k_min >= 0.7",
+];
+/// A limit is compared where that of more nodes is known to this share of its error, or of how far it is off.
+const KNOWN: f64 = 0.35;
 
 /// Draws the spec of a family: ellipses and flowers, all flows, weak and strong perturbations, few nodes and many.
 fn family(seed: u64, index: u32) -> String {
@@ -99,15 +120,18 @@ impl Coverage {
     }
 }
 
+/// Seed of the families to draw and members of each, where a run that says nothing has these.
+fn drawn(seed: u64, members: u64) -> (u64, u64) {
+    let given = |given: String| {
+        given.split_once(',').map(|(a, b)| (a.parse().unwrap(), b.parse().unwrap())).expect("SEED,MEMBERS")
+    };
+    env::var("CURVELAX_FAMILIES").map_or((seed, members), given)
+}
+
 #[test]
 fn limits_of_families_that_the_rule_has_not_seen_are_within_their_bars() {
     let all = env::var("CURVELAX_TESTS").is_ok_and(|tests| tests == "all");
-    let (seed, members) = match env::var("CURVELAX_FAMILIES") {
-        Ok(given) => {
-            given.split_once(',').map(|(a, b)| (a.parse().unwrap(), b.parse().unwrap())).expect("SEED,MEMBERS")
-        }
-        Err(_) => (SEED, if all { ALL_MEMBERS } else { MEMBERS }),
-    };
+    let (seed, members) = drawn(SEED, if all { ALL_MEMBERS } else { MEMBERS });
     let told = |family: Coverage| {
         eprintln!("{}", family.line);
         family
@@ -124,4 +148,70 @@ fn limits_of_families_that_the_rule_has_not_seen_are_within_their_bars() {
     // The control: bars of a twentieth do not hold.
     assert!(inside(0.05) * 2 < known, "{} of {known} within a twentieth", inside(0.05));
     assert!(families.iter().filter(|family| family.holds(0.05)).count() < families.len() / 4, "blind");
+}
+
+/// The limit of an event of a member.
+struct LimitOfEvent {
+    /// The distance from that of four times the nodes.
+    off: f64,
+    error: f64,
+    t: f64,
+}
+
+/// The limits of a family by event.
+fn limits_of_events(text: &str, members: u64) -> [Vec<LimitOfEvent>; EVENTS.len()] {
+    let limits = |finer: usize| {
+        let mut spec = Spec { curves: members, ..Spec::from_toml(text).unwrap() };
+        spec.points *= finer;
+        spec.event = (0..).zip(EVENTS).map(|(i, event)| format!("e{i} = {event}").parse().unwrap()).collect();
+        spec.make_accurate(&[]);
+        let mut members: Vec<Ended> = Vec::new();
+        relax(&Study::new(spec).unwrap(), &mut members).unwrap();
+        members.sort_by_key(|member| member.outcome.member);
+        members
+    };
+    let (own, truth) = (limits(1), limits(4));
+    assert_eq!([own.len() as u64, truth.len() as u64], [members; 2]);
+    std::array::from_fn(|event| {
+        let pairs = own.iter().zip(&truth);
+        let known = pairs.filter_map(|(own, truth)| {
+            let [own, truth] = [own, truth].map(|of| of.outcome.limit_of_event(event));
+            let (own, truth) = own.zip(truth)?;
+            let off = (own.t - truth.t).abs();
+            let is_known = own.error > 0.0 && truth.error <= KNOWN * own.error.max(off);
+            is_known.then_some(LimitOfEvent { off, error: own.error, t: own.t })
+        });
+        known.collect()
+    })
+}
+
+#[test]
+fn limits_of_events_of_families_are_within_their_errors() {
+    let (seed, members) = drawn(SEED_OF_EVENTS, MEMBERS_OF_EVENTS);
+    let families: Vec<_> = (0..FAMILIES).map(|index| limits_of_events(&family(seed, index), members)).collect();
+    let (mut known, mut inside, mut blind) = (0, 0, 0);
+    for (event, name) in EVENTS.into_iter().enumerate() {
+        let own: Vec<&LimitOfEvent> = families.iter().flat_map(|family| &family[event]).collect();
+        let within = |share: f64| own.iter().filter(|limit| limit.off <= share * limit.error).count();
+        let ranked = |of: &dyn Fn(&LimitOfEvent) -> f64| {
+            let mut values: Vec<f64> = own.iter().map(|limit| of(limit)).collect();
+            values.sort_by(f64::total_cmp);
+            [values.get(values.len() / 2), values.last()].map(|value| value.copied().unwrap_or(f64::NAN))
+        };
+        let ([_, worst], [relative, _]) =
+            (ranked(&|limit| limit.off / limit.error), ranked(&|limit| limit.error / limit.t));
+        let [wide, _] = ranked(&|limit| limit.error / limit.off);
+        eprintln!(
+            "{name}: {} of {} inside, worst {worst:.2} bars, bar {wide:.1} times the error and {relative:.1e} of the time",
+            within(1.0),
+            own.len()
+        );
+        // All but one in ten, or all but two.
+        assert!(own.len() - within(1.0) <= (own.len() / 10).max(2), "{name}");
+        (known, inside, blind) = (known + own.len(), inside + within(1.0), blind + within(0.02));
+    }
+    assert!(known as u64 * 3 > EVENTS.len() as u64 * u64::from(FAMILIES) * members, "{known} limits only");
+    assert!(inside * 50 >= known * 49, "{inside} of {known} inside");
+    // The control: errors of a fiftieth do not hold.
+    assert!(blind * 2 < known, "{blind} of {known} within a fiftieth");
 }

@@ -76,6 +76,7 @@ columns! { LevelRow:
     turn: number = turn, "largest angle by which the tangent of the initial curve turns at a node, in rad: above 0.5 the nodes do not resolve it";
     excess_start: number = excess_start, "as in `summary.csv`, at these nodes";
     t_vanish: event = t_vanish, "as in `summary.csv`";
+    length_start: number = length_start, "as in `summary.csv`, at these nodes";
 }
 
 /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.

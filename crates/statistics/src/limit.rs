@@ -4,10 +4,12 @@
 //! which they do not show. Two things tell its size: the terms in h² and h⁴ at the finest resolution, and the factor ρ
 //! by which terms fall. That is about the square of the angle by which the tangent turns at a node, θ: for a smooth
 //! curve it goes with h, and where θ is not small, n nodes do not resolve the curve, whatever the differences of the
-//! times say. A weak mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. ρ is
-//! therefore the larger of θ² and a multiple of the ratio of the two terms. From the term in h⁴ what is left is about
-//! `ρ·|term in h⁴|`, from that in h² it is `ρ²·|term in h²|`; their sum cannot vanish by chance. A fourth resolution
-//! shows the term in h⁶ itself, by what it changes in the limit.
+//! times say. A weak mode of many waves turns little and falls more slowly; its terms in h² and h⁴ show it. Early times
+//! depend on the short waves that still live then: those of wave number k decay as exp(-k⁴t), so their phase turns by
+//! about (L/n)/t^¼ at a node. And where the terms are not small beside the time itself, no more are those that follow.
+//! ρ is therefore the largest of θ², that phase squared, the terms over the time, and a multiple of the ratio of the
+//! two terms. From the term in h⁴ what is left is about `ρ·|term in h⁴|`, from that in h² it is `ρ²·|term in h²|`;
+//! their sum cannot vanish by chance. A fourth resolution shows the term in h⁶ itself, by what it changes in the limit.
 //!
 //! The steps in time leave a part that goes with their tolerance, so a ninth of what ten times more exact steps change
 //! is what these leave themselves. It is removed. What remains goes with that change, or with the tolerance over the
@@ -31,10 +33,16 @@ const OF_OPEN: f64 = 1.25;
 const OF_NOISE: f64 = 2.0;
 /// The factor by which terms fall in units of that from the one in h² to the one in h⁴.
 const OF_FALL: f64 = 1.5;
+/// The same in units of (L/n)²/√t: the phase, squared, of the waves that have fallen by e⁻² at that time.
+const OF_WAVES: f64 = std::f64::consts::SQRT_2;
+/// How much larger it is for energy and area, on which short waves weigh more.
+const OF_BENDING: f64 = 2.0;
 /// Orders by which differences fall somehow where nodes are too few; and the error of what has no such order, in units
 /// of the largest difference.
 const LOOSE_ORDERS: std::ops::RangeInclusive<f64> = 1.0..=4.0;
 const OF_DIFFERENCES: f64 = 1.5;
+/// The same where the differences are of extremes over the nodes: the true extreme lies anywhere between two of these.
+const OF_EXTREMES: f64 = 2.5;
 /// By how much an error may fall from one level to the next, which has √2 times the nodes. Errors fall as h⁶, by 8;
 /// those of levels that do not resolve the curve are bounds, and fall faster. Where terms do not fall yet, as h⁴.
 const FALL: f64 = 32.0;
@@ -62,9 +70,25 @@ const WIDE: f64 = 1e-3;
 /// times may agree by chance.
 const BLIND_TURN: f64 = 0.7;
 
+/// What reaches a value at a time, which decides how the errors of that time fall.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimeOf {
+    /// The curve is relaxed, or vanishes.
+    #[default]
+    End,
+    /// Length or excess, on the way.
+    Shape,
+    /// Energy or area, whose rates go with powers of the curvature.
+    Bending,
+    /// The largest or smallest of the values at the nodes. Its errors do not fall as a power of h.
+    Extreme,
+}
+
 /// One time, computed at several resolutions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Times {
+    /// Of what.
+    pub of: TimeOf,
     /// As it is to be judged.
     pub own: f64,
     /// With more exact steps, at growing numbers of nodes, at least three.
@@ -82,6 +106,8 @@ pub struct Times {
     pub share_of_steps: Option<f64>,
     /// Largest angle by which the tangent of the initial curve turns at a node of the finest level, in radians.
     pub turn: f64,
+    /// Length of the initial curve, in the unit whose fourth power is that of the times.
+    pub length: f64,
     /// The excess at that time, or a smaller one.
     pub excess: f64,
     /// Whether the terms are those of a plain curve, with no waves of γ or M, of which more levels tell more.
@@ -110,15 +136,15 @@ impl Limit {
     /// Estimates the limit from the three finest levels; those below them must not have promised less.
     ///
     /// ```
-    /// use curvelax_statistics::{Limit, SHARE_OF_STEPS, Times};
+    /// use curvelax_statistics::{Limit, SHARE_OF_STEPS, TimeOf, Times};
     ///
     /// let points = [50, 71, 100];
     /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
     /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
     /// let (own, own_level, tolerance, share_of_steps) = (0.804, 2, 1e-4, Some(SHARE_OF_STEPS));
-    /// let (turn, excess, is_plain) = (0.2, 2e-3, true);
+    /// let (of, turn, length, excess, is_plain) = (TimeOf::End, 0.2, 6.3, 2e-3, true);
     /// let limit = Limit::of(&Times {
-    ///     own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, excess, is_plain,
+    ///     of, own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, length, excess, is_plain,
     /// });
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
@@ -128,6 +154,7 @@ impl Limit {
     /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
         let Times {
+            of,
             own,
             ref levels,
             ref points,
@@ -136,6 +163,7 @@ impl Limit {
             tolerance,
             share_of_steps,
             turn,
+            length,
             excess,
             is_plain,
         } = *times;
@@ -143,7 +171,8 @@ impl Limit {
         let of_three = |from: usize| {
             let at = [0, 1, 2].map(|i| from + i);
             let (points, rounding) = (at.map(|i| points[i]), at.map(|i| rounding[i] * levels[i]));
-            OfSpace::of(at.map(|i| levels[i]), points, rounding, turn * finest as f64 / points[2] as f64)
+            let (turn, spacing) = (turn * finest as f64 / points[2] as f64, length / points[2] as f64);
+            OfSpace::of(at.map(|i| levels[i]), points, rounding, Nodes { of, turn, spacing })
         };
         let of_space: Vec<OfSpace> = (0..levels.len() - 2).rev().map(of_three).collect();
         let OfSpace { t, three, error, rounding, order, asymptotic } = of_space[0];
@@ -153,7 +182,7 @@ impl Limit {
         let promised = of_space[1..].iter().zip(scales).map(|(coarser, scale)| scale * coarser.error);
         let error = promised.fold(error, f64::max);
         let error = match of_space.get(1) {
-            Some(coarser) if asymptotic && is_plain => {
+            Some(coarser) if asymptotic && is_plain && of == TimeOf::End => {
                 error.min(OF_CHANGE * (three - coarser.three).abs() + OF_THREE * error)
             }
             _ => error,
@@ -210,10 +239,28 @@ struct OfSpace {
     asymptotic: bool,
 }
 
+/// How well the nodes of a level resolve what a time is that of.
+#[derive(Clone, Copy)]
+struct Nodes {
+    of: TimeOf,
+    /// By how much the tangent turns at a node.
+    turn: f64,
+    /// Mean distance of two.
+    spacing: f64,
+}
+
+impl Nodes {
+    /// The factor by which terms fall, at most 1, at the time `t` with these terms.
+    fn fall(self, t: f64, terms: [f64; 2]) -> f64 {
+        let waves = OF_WAVES * self.spacing.powi(2) / t.abs().sqrt();
+        let fall = self.turn.powi(2).max(waves).max((terms[0] + terms[1]) / t.abs());
+        if self.of == TimeOf::Bending { (OF_BENDING * fall).min(1.0) } else { fall.min(1.0) }
+    }
+}
+
 impl OfSpace {
-    /// Extrapolates from three levels, the finest last, which `rounding` moves, where the tangent turns by `turn` at a
-    /// node.
-    fn of([half, between, full]: [f64; 3], points: [usize; 3], rounding: [f64; 3], turn: f64) -> OfSpace {
+    /// Extrapolates from three levels, the finest last, which `rounding` moves, with such nodes at the finest.
+    fn of([half, between, full]: [f64; 3], points: [usize; 3], rounding: [f64; 3], nodes: Nodes) -> OfSpace {
         // (n/n')²: how much larger the leading error is.
         let [p, q] = [points[0], points[1]].map(|n| (points[2] as f64 / n as f64).powi(2));
         let two = |[_, between, full]: [f64; 3]| full - (between - full) / (q - 1.0);
@@ -231,15 +278,18 @@ impl OfSpace {
         let farthest = [half - between, between - full, half - full].map(f64::abs).into_iter().fold(0.0, f64::max);
         let terms = [(two - full).abs(), (three - two).abs()];
         let falls_by = |orders: std::ops::RangeInclusive<f64>| order.is_some_and(|order| orders.contains(&order));
-        let is_resolved = turn <= MAX_TURN;
-        let asymptotic = is_resolved && (falls_by(ORDERS) || farthest < (SMALL * full).max(OF_NOISE * noise));
+        let (is_resolved, is_smooth) = (nodes.turn <= MAX_TURN, nodes.of != TimeOf::Extreme);
+        let is_small = farthest < (SMALL * full).max(OF_NOISE * noise);
+        let asymptotic = is_resolved && is_smooth && (falls_by(ORDERS) || is_small);
+        let fall = nodes.fall(three, terms);
         let (t, error, rounding) = if asymptotic {
-            let left = OF_SPACE * remainder(terms, turn.powi(2));
+            let left = OF_SPACE * remainder(terms, fall);
             (three, if falls_by(ORDERS) { left } else { left.max(farthest) }, moved_three)
         } else {
-            let bound = OF_OPEN * remainder(terms, turn.min(1.0));
-            let few_nodes_explain = !is_resolved && falls_by(LOOSE_ORDERS);
-            (two, if few_nodes_explain { bound } else { bound.max(OF_DIFFERENCES * farthest) }, moved_two)
+            let bound = OF_OPEN * remainder(terms, fall.sqrt());
+            let few_nodes_explain = !is_resolved && is_smooth && falls_by(LOOSE_ORDERS);
+            let of_differences = if is_smooth { OF_DIFFERENCES } else { OF_EXTREMES };
+            (two, if few_nodes_explain { bound } else { bound.max(of_differences * farthest) }, moved_two)
         };
         OfSpace { t, three, error, rounding, order, asymptotic }
     }
@@ -297,8 +347,10 @@ mod tests {
             tolerance: 1e-4,
             share_of_steps: Some(SHARE_OF_STEPS),
             turn: 0.2,
+            length: 6.3,
             excess: 2e-3,
             is_plain: true,
+            of: TimeOf::End,
         }
     }
 
@@ -379,6 +431,30 @@ mod tests {
         assert_eq!(limit(&four_levels, false).error, three.error);
     }
 
+    /// Of the events of docs/internals/method.md#limit-of-events: which, nodes, their times, the turn, the limit.
+    #[test]
+    fn limits_of_events_are_within_their_errors() {
+        let within = |of: TimeOf, length: f64, (points, levels, turn, t): ([usize; 3], [f64; 3], f64, f64)| {
+            let times = Times { of, points: points.to_vec(), turn, length, ..times(levels.to_vec()) };
+            let limit = Limit::of(&times);
+            (limit.asymptotic, (limit.t - t).abs() < limit.error)
+        };
+        // Length falls by 1 %: early, on short waves. The control has none.
+        let early = (POINTS, [3.548561e-4, 3.32852e-4, 3.226214e-4], 0.26, 3.12173e-4);
+        assert_eq!(within(TimeOf::Shape, 6.5, early), (true, true));
+        assert_eq!(within(TimeOf::Shape, 0.0, early), (true, false));
+        // Energy falls by a tenth, with terms as large as the time.
+        let large = (POINTS, [2.966020e-2, 1.640909e-2, 9.726496e-3], 0.1424, 4.0946e-3);
+        assert_eq!(within(TimeOf::Bending, 8.0, large), (true, true));
+        // By a half, on waves that are shorter than those of the shape.
+        let half = ([75, 106, 150], [1.351263e-2, 1.263854e-2, 1.22038e-2], 0.14, 1.17702e-2);
+        assert_eq!([TimeOf::Bending, TimeOf::Shape].map(|of| within(of, 6.9, half)), [(true, true), (true, false)]);
+        // The largest curvature of the nodes falls to 1.2: order 2 by chance.
+        let largest = ([40, 57, 80], [5.553012e-2, 5.936192e-2, 6.115425e-2], 0.15, 6.287514e-2);
+        assert_eq!(within(TimeOf::Extreme, 8.0, largest), (false, true));
+        assert_eq!(within(TimeOf::Shape, 8.0, largest), (true, false));
+    }
+
     #[test]
     fn more_nodes_are_worth_it_until_differences_fall_or_are_small() {
         let three = on(&POINTS, 0.8, falling(0.8));
@@ -454,7 +530,15 @@ mod tests {
 
     #[test]
     fn times_in_another_unit_have_the_limit_in_that_unit() {
-        let [one, other] = [1.0, 1024.0].map(|unit| limit(|h| unit * (2.0 + 50.0 * h.powi(2) + 1e4 * h.powi(4))));
-        assert_eq!((1024.0 * one.t, 1024.0 * one.error, one.order), (other.t, other.error, other.order));
+        // So early that short waves decide.
+        let at = |h: f64| 2e-3 * (1.0 + 50.0 * h.powi(2) + 1e4 * h.powi(4));
+        let limit = |unit: f64, length: f64| {
+            let levels = POINTS.map(|n| unit * at(1.0 / n as f64)).to_vec();
+            Limit::of(&Times { length, ..times(levels) })
+        };
+        let (one, other) = (limit(1.0, 6.3), limit(4096.0, 8.0 * 6.3));
+        assert_eq!((4096.0 * one.t, 4096.0 * one.error, one.order), (other.t, other.error, other.order));
+        // The control: the same length.
+        assert!(limit(4096.0, 6.3).error < 0.9 * other.error);
     }
 }

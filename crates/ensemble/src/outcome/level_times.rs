@@ -4,7 +4,7 @@ use super::levels::{LevelRow, RefinementLevel, tolerance};
 use crate::{Outcome, Spec, Variation, request::spec::Pace, theory::vanishing::LITTLE_EXCESS};
 use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
-use curvelax_statistics::{Limit, SHARE_OF_STEPS, Times};
+use curvelax_statistics::{Limit, SHARE_OF_STEPS, TimeOf, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
 const OF_STEPS: f64 = 5e-5;
@@ -33,6 +33,8 @@ struct AtLevel {
     t_vanish: f64,
     /// Largest turn of the tangent at a node of the initial curve.
     turn: f64,
+    /// Length of the initial curve.
+    length: f64,
     /// Excess of the initial curve.
     excess: f64,
     /// The numbers in which it was computed.
@@ -97,10 +99,11 @@ impl Ladder {
         Ladder { levels, times, precisions }
     }
 
-    /// What it tells of the time `own` at the nodes of `spec`, judged as `of`, with the curve at its finest level. A
-    /// time that is 0 at these nodes and at all finer levels has the limit 0. There is none if the ladder is too short,
-    /// does not have these nodes, the time is 0 at some of its levels only, or tends below 0.
-    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime) -> Option<Limit> {
+    /// What it tells of the time `own` at the nodes of `spec`, at which a value is `reached`, judged as `of`, with the
+    /// curve at its finest level. A time that is 0 at these nodes and at all finer levels has the limit 0. There is
+    /// none if the ladder is too short, does not have these nodes, the time is 0 at some of its levels only, or tends
+    /// below 0.
+    fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime, reached: TimeOf) -> Option<Limit> {
         let Ladder { levels, times, precisions } = self;
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         // What holds at the start, with more nodes, too, does so with any number of them.
@@ -124,6 +127,7 @@ impl Ladder {
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
         let (levels, is_plain) = (times, spec.turns() == 1.0 && !spec.has_crystals());
         let limit = Limit::of(&Times {
+            of: reached,
             own,
             levels,
             points,
@@ -132,6 +136,7 @@ impl Ladder {
             tolerance,
             share_of_steps,
             turn,
+            length: finest.length,
             excess,
             is_plain,
         });
@@ -155,9 +160,9 @@ impl LevelTimes {
         if let Some(last) = own.last().filter(|last| last.member >= row.member) {
             return Err(format!("a member after {}: members of a level ascend, each once", last.member));
         }
-        let LevelRow { member, turn, excess_start: excess, precision, .. } = *row;
+        let LevelRow { member, turn, length_start: length, excess_start: excess, precision, .. } = *row;
         let [t_relax, t_vanish] = [row.t_relax, row.t_vanish].map(|t| t.unwrap_or(f64::NAN));
-        own.push(AtLevel { member, t_relax, t_vanish, turn, excess, precision });
+        own.push(AtLevel { member, t_relax, t_vanish, turn, length, excess, precision });
         self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
@@ -190,7 +195,7 @@ impl LevelTimes {
             let own = self.time(of, RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0);
             let Some((own, _)) = own.filter(|_| is_later) else { return false };
             // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
-            let limit = ladder.limit(spec, own, finest, of);
+            let limit = ladder.limit(spec, own, finest, of, TimeOf::End);
             limit.is_none_or(|limit| limit.needs_more(turn(spec, finest)))
         })
     }
@@ -202,7 +207,8 @@ impl LevelTimes {
         let of_event = |(place, own): (usize, &Option<f64>)| {
             let ladder = self.ladder(|level| self.event_time(level, member, [place, count]));
             let finest = self.at(*ladder.levels.last()?, member)?;
-            ladder.limit(spec, (*own)?, finest, EndTime::Relaxation)
+            let reached = spec.event.get(place)?.condition.observable.time_of();
+            ladder.limit(spec, (*own)?, finest, EndTime::Relaxation, reached)
         };
         outcome.judged_events = outcome.events.iter().enumerate().map(of_event).collect();
         // What is left of the life of one that is not round is not that of a circle.
@@ -232,7 +238,7 @@ impl LevelTimes {
         let ladder = self.ladder(|level| self.time(of, level, member));
         let level = *ladder.levels.last()?;
         let finest = self.at(level, member)?;
-        let mut limit = ladder.limit(spec, own?, finest, of)?;
+        let mut limit = ladder.limit(spec, own?, finest, of, TimeOf::End)?;
         let by_radius = self.moved_by(member, Variation::TwiceTheRadius, of).unwrap_or_default();
         limit.fixed += by_radius;
         limit.error += by_radius;
@@ -318,7 +324,9 @@ mod tests {
         for level in RefinementLevel::FIRST {
             let n = level.points(100) as f64;
             let (level, turn, t_relax) = (level.number(), turn * 100.0 / n, Some(1.0 + 4.0 / (n * n)));
-            times.add(&LevelRow { level, turn, t_relax, excess_start: 0.2, ..LevelRow::default() }).unwrap();
+            times
+                .add(&LevelRow { level, turn, t_relax, excess_start: 0.2, length_start: 6.3, ..LevelRow::default() })
+                .unwrap();
         }
         times.needs(&spec, 0, RefinementLevel::of_number(4).unwrap())
     }
@@ -329,8 +337,13 @@ mod tests {
         let judged = |at_levels: [f64; 3]| {
             let mut times = LevelTimes::default();
             for (level, t) in RefinementLevel::FIRST.into_iter().zip(at_levels) {
-                let row =
-                    LevelRow { level: level.number(), t_relax: Some(t), excess_start: 0.2, ..LevelRow::default() };
+                let row = LevelRow {
+                    level: level.number(),
+                    t_relax: Some(t),
+                    excess_start: 0.2,
+                    length_start: 6.3,
+                    ..LevelRow::default()
+                };
                 times.add(&LevelRow { events: vec![Some(t)], ..row }).unwrap();
             }
             let mut own = Outcome { t_relax: Some(0.0), events: vec![Some(0.0)], ..Outcome::default() };
@@ -349,7 +362,15 @@ mod tests {
         let needs = |last: f64| {
             let mut times = LevelTimes::default();
             for (level, t) in (1..).zip([0.3, 0.2, 0.1, last]) {
-                times.add(&LevelRow { level, t_relax: Some(t), excess_start: 0.2, ..LevelRow::default() }).unwrap();
+                times
+                    .add(&LevelRow {
+                        level,
+                        t_relax: Some(t),
+                        excess_start: 0.2,
+                        length_start: 6.3,
+                        ..LevelRow::default()
+                    })
+                    .unwrap();
             }
             times.needs(&spec, 0, RefinementLevel::of_number(5).unwrap())
         };
@@ -363,7 +384,8 @@ mod tests {
             let mut times = LevelTimes::default();
             for level in RefinementLevel::FIRST {
                 let n = level.points(100) as f64;
-                let row = LevelRow { level: level.number(), excess_start: 0.2, ..LevelRow::default() };
+                let row =
+                    LevelRow { level: level.number(), excess_start: 0.2, length_start: 6.3, ..LevelRow::default() };
                 times.add(&LevelRow { t_relax: Some(at_infinity + 10.0 / (n * n)), ..row }).unwrap();
             }
             let mut own = Outcome { t_relax: Some(at_infinity + 1e-3), ..Outcome::default() };

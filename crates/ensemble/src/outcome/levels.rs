@@ -189,6 +189,8 @@ pub struct LevelRow {
     pub solves: u64,
     /// Largest angle by which the tangent of the initial curve turns at a node, in radians.
     pub turn: f64,
+    /// Length of the initial curve.
+    pub length_start: f64,
     /// Excess of the initial curve.
     pub excess_start: f64,
     /// The times of its events, in the order of the spec: the rows of `event_levels.csv`.
@@ -210,6 +212,7 @@ impl LevelRow {
             t_vanish: ended.t_vanish,
             solves: ended.solves,
             turn: ended.turn,
+            length_start: ended.start.length,
             excess_start: ended.start.excess,
             events: ended.events.clone(),
         }

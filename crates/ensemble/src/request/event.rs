@@ -12,6 +12,7 @@ use curvelax_base::{
     text::number,
 };
 use curvelax_flow::scheme::member::Observed;
+use curvelax_statistics::TimeOf;
 
 /// Maximum events of a spec.
 pub const MAX_EVENTS: usize = 32;
@@ -106,6 +107,17 @@ impl Observable {
             Observable::MaxCurvature => at.k_max,
             Observable::MeshRatio => at.mesh_ratio,
             Observable::MetricDrift => at.metric_drift,
+        }
+    }
+
+    /// What a time is at which it reaches a value.
+    pub fn time_of(self) -> TimeOf {
+        match self {
+            Observable::Length | Observable::Excess => TimeOf::Shape,
+            Observable::Area | Observable::Energy => TimeOf::Bending,
+            Observable::MinCurvature | Observable::MaxCurvature | Observable::MeshRatio | Observable::MetricDrift => {
+                TimeOf::Extreme
+            }
         }
     }
 
