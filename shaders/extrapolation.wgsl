@@ -5,8 +5,9 @@ const LEAST_ORDER = 2u;
 const SHARED_PARTS = 3u;
 /// Weight of an error of the nodes over one of the curvature, both relative.
 const NODE_WEIGHT = 20.0;
-/// Rounding of a step in short numbers, in units of ε.
+/// Rounding of a step in short numbers, in units of ε: the least tolerance, and errors that say nothing.
 const NOISE = 50.0;
+const NOISE_OF_SCALE = 20.0;
 /// The same of the curvature of a polygon, towards which a curve may be pulled, in units of `(n/L)²`.
 const NOISE_OF_POLYGON = 2.2351741790771484e-9;
 
@@ -154,7 +155,7 @@ fn errors_of_attempt(largest: LargestGaps) -> vec2<real> {
     var scale = select(sqrt(size * spread), size, all_reports[member].report.now.excess <= all_parameters[member].follow_to);
     // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
     if IS_SHORT {
-        var noise = size * real(NOISE * EPSILON);
+        var noise = size * real(NOISE_OF_SCALE * EPSILON);
         if all_parameters[member].pull > real(0.0) {
             let edge = sums.x / real(node_count());
             noise += real(NOISE_OF_POLYGON) / (edge * edge);

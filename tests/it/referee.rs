@@ -226,6 +226,12 @@ fn the_command_prints_and_writes_what_it_compared() {
         "{text}"
     );
 
+    let (code, _, said) = run("--shape ellipse:2,1 --relax-at 5");
+    assert!(
+        code == Some(2) && said.contains("relaxed at its start, where its excess is 0.189 and the threshold 5.00"),
+        "{said}"
+    );
+
     let (code, printed, said) =
         run("--curves 6 --only 1,4 --shape ellipse:1.5,1 --points 128 --seed 3 --force --out out");
     assert_eq!((code, printed.lines().count()), (Some(0), 3), "{said}");

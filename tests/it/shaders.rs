@@ -363,6 +363,7 @@ fn the_constants_of_shaders_and_host_are_equal() {
         ("AFTER_REFUSALS", pace::AFTER_REFUSALS),
         ("ROUNDING", pace::ROUNDING),
         ("NOISE", extrapolation::NOISE),
+        ("NOISE_OF_SCALE", extrapolation::NOISE_OF_SCALE),
         ("ONCE", pace::ONCE),
         ("TWICE", pace::TWICE),
         ("THRICE", pace::THRICE),

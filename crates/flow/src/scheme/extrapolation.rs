@@ -36,8 +36,11 @@ pub const MOST_ORDER_F32: u32 = 4;
 pub const NODE_WEIGHT: f64 = 20.0;
 
 /// Rounding of a step in short numbers, in units of ε: each part adds that of k, r and the nodes, and the weights of
-/// the rows multiply it.
+/// the rows multiply it. No tolerance is below it: crystals and vesicles at rest, which err by nothing else, would
+/// creep.
 pub const NOISE: f64 = 50.0;
+/// The same for errors of the curvature that say nothing, whatever the tolerance.
+pub const NOISE_OF_SCALE: f64 = 20.0;
 /// The same of the curvature of a polygon, towards which a curve may be pulled, in units of `(n/L)²`.
 pub const NOISE_OF_POLYGON: f64 = 0.3 * STEP as f64;
 
@@ -265,7 +268,7 @@ pub fn errors_of_attempt<N: Number>(
     let mut scale = N::select(followed, (size * spread).sqrt(), size);
     if N::IS_SHORT {
         // Errors below the rounding of k and of the nodes, which does not know how round the curve is, say nothing.
-        let mut noise = size * N::of(NOISE * N::EPSILON);
+        let mut noise = size * N::of(NOISE_OF_SCALE * N::EPSILON);
         if branches.pulled {
             let edge = length / N::of(new.len() as f64);
             noise += N::of(NOISE_OF_POLYGON) / (edge * edge);

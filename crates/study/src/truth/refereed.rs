@@ -4,6 +4,7 @@ use super::{Referee, Truth};
 use crate::relax;
 use curvelax_base::{
     error::{Error, Result},
+    text::significant,
     threads,
 };
 use curvelax_ensemble::{Cell, Ended, Outcome, Spec, Study};
@@ -76,12 +77,13 @@ impl RefereeRow {
 /// ```
 ///
 /// # Errors
-/// Those of [`Referee::new`] and [`Referee::time_of_excess`]; an outline of a file and a driving force are refused.
+/// Those of [`Referee::new`] and [`Referee::time_of_excess`]; outlines, curves that are relaxed at the start, a driving
+/// force and constraints are refused.
 pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
     let Cell { spec, family, .. } = cell;
     if family.outline(index).is_some() {
-        let (problem, remedy) = ("the referee solves for smooth curves, and a polygon has corners", "name a formula");
-        return Err(Error::value("shape", &spec.shape, problem, remedy));
+        let problem = "the referee solves for curves that have a formula, and an outline is given by points";
+        return Err(Error::value("shape", &spec.shape, problem, "use an ellipse or a flower"));
     }
     if let Some(drive) = &spec.drive {
         let problem = "the referee solves for flows without a driving force";
@@ -93,7 +95,15 @@ pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
     }
     let (point, own) = family.curve(index)?;
     let referee = Referee::new(point, &own.unwrap_or_else(|| spec.typical().flow.into_owned()))?;
-    let truth = referee.time_of_excess(spec.threshold(referee.excess()))?;
+    let (threshold, excess) = (spec.threshold(referee.excess()), referee.excess());
+    if excess <= threshold {
+        let [excess, threshold] = [excess, threshold].map(|value| significant(value, 3));
+        return Err(Error::Request(format!(
+            "the curve is relaxed at its start, where its excess is {excess} and the threshold {threshold}; use a smaller \
+             --relax-to or --relax-at"
+        )));
+    }
+    let truth = referee.time_of_excess(threshold)?;
     Ok(Truth { t: truth.t / spec.mobility(), ..truth })
 }
 
