@@ -126,6 +126,11 @@ impl Shape {
         }
     }
 
+    /// Whether it is made of points rather than by a formula.
+    pub fn is_outline(&self) -> bool {
+        matches!(self, Shape::File(_) | Shape::Files(_))
+    }
+
     /// Returns the lowest mode, 2 or more, by which the shape differs from a circle; it decays last. `None` for a
     /// circle, and for a lemniscate, which never becomes one.
     pub fn lowest_mode(&self) -> Option<u32> {

@@ -66,7 +66,7 @@ pub use describe::Description;
 pub use exact::{ExactSum, Moments};
 pub use explain::{FOLDS, Regression, correlation, spearman};
 pub use fit::{GoodnessOfFit, Line, PowerLaw};
-pub use limit::{FINER_STEPS, Limit, SHARE_OF_STEPS, TimeOf, Times};
+pub use limit::{FINER_STEPS, Limit, SHARE_OF_STEPS, Terms, TimeOf, Times};
 pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};

@@ -84,6 +84,18 @@ pub enum TimeOf {
     Extreme,
 }
 
+/// What disturbs the terms of a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Terms {
+    /// Nothing: of these, more levels tell more.
+    #[default]
+    Plain,
+    /// Waves of γ or M, or a length that is kept.
+    Waves,
+    /// A curve through points, whose third derivative jumps there: no term but the first is regular.
+    Points,
+}
+
 /// One time, computed at several resolutions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Times {
@@ -110,8 +122,8 @@ pub struct Times {
     pub length: f64,
     /// The excess at that time, or a smaller one.
     pub excess: f64,
-    /// Whether the terms are those of a plain curve, with no waves of γ or M, of which more levels tell more.
-    pub is_plain: bool,
+    /// What disturbs its terms.
+    pub terms: Terms,
 }
 
 /// What the time tends to.
@@ -136,15 +148,15 @@ impl Limit {
     /// Estimates the limit from the three finest levels; those below them must not have promised less.
     ///
     /// ```
-    /// use curvelax_statistics::{Limit, SHARE_OF_STEPS, TimeOf, Times};
+    /// use curvelax_statistics::{Limit, SHARE_OF_STEPS, Terms, TimeOf, Times};
     ///
     /// let points = [50, 71, 100];
     /// let levels = points.map(|n| 0.8 + 40.0 / f64::from(n).powi(2)).to_vec();
     /// let (points, rounding) = (points.map(|n| n as usize).to_vec(), vec![0.0; 3]);
     /// let (own, own_level, tolerance, share_of_steps) = (0.804, 2, 1e-4, Some(SHARE_OF_STEPS));
-    /// let (of, turn, length, excess, is_plain) = (TimeOf::End, 0.2, 6.3, 2e-3, true);
+    /// let (of, turn, length, excess, terms) = (TimeOf::End, 0.2, 6.3, 2e-3, Terms::Plain);
     /// let limit = Limit::of(&Times {
-    ///     of, own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, length, excess, is_plain,
+    ///     of, own, levels, points, rounding, own_level, tolerance, share_of_steps, turn, length, excess, terms,
     /// });
     /// assert!((limit.t - 0.8).abs() < 1e-12 && limit.error < 1e-3 && limit.asymptotic);
     /// assert!((limit.order.unwrap() - 2.0).abs() < 1e-9 && (limit.relative - 0.005).abs() < 1e-12);
@@ -165,14 +177,14 @@ impl Limit {
             turn,
             length,
             excess,
-            is_plain,
+            terms,
         } = *times;
         let finest = points[points.len() - 1];
         let of_three = |from: usize| {
             let at = [0, 1, 2].map(|i| from + i);
             let (points, rounding) = (at.map(|i| points[i]), at.map(|i| rounding[i] * levels[i]));
             let (turn, spacing) = (turn * finest as f64 / points[2] as f64, length / points[2] as f64);
-            OfSpace::of(at.map(|i| levels[i]), points, rounding, Nodes { of, turn, spacing })
+            OfSpace::of(at.map(|i| levels[i]), points, rounding, Nodes { of, terms, turn, spacing })
         };
         let of_space: Vec<OfSpace> = (0..levels.len() - 2).rev().map(of_three).collect();
         let OfSpace { t, three, error, rounding, order, asymptotic } = of_space[0];
@@ -182,7 +194,7 @@ impl Limit {
         let promised = of_space[1..].iter().zip(scales).map(|(coarser, scale)| scale * coarser.error);
         let error = promised.fold(error, f64::max);
         let error = match of_space.get(1) {
-            Some(coarser) if asymptotic && is_plain && of == TimeOf::End => {
+            Some(coarser) if asymptotic && terms == Terms::Plain && of == TimeOf::End => {
                 error.min(OF_CHANGE * (three - coarser.three).abs() + OF_THREE * error)
             }
             _ => error,
@@ -243,6 +255,7 @@ struct OfSpace {
 #[derive(Clone, Copy)]
 struct Nodes {
     of: TimeOf,
+    terms: Terms,
     /// By how much the tangent turns at a node.
     turn: f64,
     /// Mean distance of two.
@@ -279,11 +292,12 @@ impl OfSpace {
         let terms = [(two - full).abs(), (three - two).abs()];
         let falls_by = |orders: std::ops::RangeInclusive<f64>| order.is_some_and(|order| orders.contains(&order));
         let (is_resolved, is_smooth) = (nodes.turn <= MAX_TURN, nodes.of != TimeOf::Extreme);
+        let is_regular = nodes.terms != Terms::Points;
         let is_small = farthest < (SMALL * full).max(OF_NOISE * noise);
         let asymptotic = is_resolved && is_smooth && (falls_by(ORDERS) || is_small);
         let fall = nodes.fall(three, terms);
         let (t, error, rounding) = if asymptotic {
-            let left = OF_SPACE * remainder(terms, fall);
+            let left = OF_SPACE * if is_regular { remainder(terms, fall) } else { after_the_first(terms, fall) };
             (three, if falls_by(ORDERS) { left } else { left.max(farthest) }, moved_three)
         } else {
             let bound = OF_OPEN * remainder(terms, fall.sqrt());
@@ -297,9 +311,18 @@ impl OfSpace {
 
 /// What follows the terms in h² and h⁴, each `fall` times the one before, or what these two show if they fall more
 /// slowly.
-fn remainder([second, fourth]: [f64; 2], fall: f64) -> f64 {
-    let fall = if OF_FALL * fourth > fall * second { (OF_FALL * fourth / second).min(1.0) } else { fall };
-    fall * (fourth + fall * second)
+fn remainder(terms: [f64; 2], fall: f64) -> f64 {
+    shown_fall(terms, fall) * after_the_first(terms, fall)
+}
+
+/// What follows the term in h², by itself and by that in h⁴, which may be small by chance.
+fn after_the_first([second, fourth]: [f64; 2], fall: f64) -> f64 {
+    fourth + shown_fall([second, fourth], fall) * second
+}
+
+/// The factor by which terms fall: `fall`, or what these two show if they fall more slowly.
+fn shown_fall([second, fourth]: [f64; 2], fall: f64) -> f64 {
+    if OF_FALL * fourth > fall * second { (OF_FALL * fourth / second).min(1.0) } else { fall }
 }
 
 /// The p for which times at three numbers of nodes are t + c n^-p.
@@ -349,7 +372,7 @@ mod tests {
             turn: 0.2,
             length: 6.3,
             excess: 2e-3,
-            is_plain: true,
+            terms: Terms::Plain,
             of: TimeOf::End,
         }
     }
@@ -416,19 +439,19 @@ mod tests {
     fn a_fourth_level_shortens_the_error_but_never_to_nothing() {
         let fall = |h: f64| (80.0 * h).powi(2);
         let at = |h: f64| 2.0 + 0.05 * fall(h) * (1.0 + 0.2 * fall(h) + 0.03 * fall(h).powi(2));
-        let limit = |points: &[usize], is_plain: bool| {
+        let limit = |points: &[usize], terms: Terms| {
             let levels = points.iter().map(|n| at(1.0 / *n as f64)).collect();
             let of = times(levels);
             let (own, own_level) = (of.levels[0], 0);
-            Limit::of(&Times { own, own_level, points: points.to_vec(), tolerance: 1e-6, turn: 0.4, is_plain, ..of })
+            Limit::of(&Times { own, own_level, points: points.to_vec(), tolerance: 1e-6, turn: 0.4, terms, ..of })
         };
         let four_levels = [71, 100, 141, 200];
-        let (four, three) = (limit(&four_levels, true), limit(&four_levels[1..], true));
+        let (four, three) = (limit(&four_levels, Terms::Plain), limit(&four_levels[1..], Terms::Plain));
         assert!(four.asymptotic && (four.t - three.t).abs() < 1e-12, "{four:?} {three:?}");
         assert!(four.error < 0.6 * three.error && (four.t - 2.0).abs() < four.error, "{four:?} {three:?}");
         assert!(four.error > OF_THREE * three.error, "{four:?} {three:?}");
         // Where waves disturb the terms, it does not count.
-        assert_eq!(limit(&four_levels, false).error, three.error);
+        assert_eq!(limit(&four_levels, Terms::Waves).error, three.error);
     }
 
     /// Of the events of docs/internals/method.md#limit-of-events: which, nodes, their times, the turn, the limit.
@@ -453,6 +476,18 @@ mod tests {
         let largest = ([40, 57, 80], [5.553012e-2, 5.936192e-2, 6.115425e-2], 0.15, 6.287514e-2);
         assert_eq!(within(TimeOf::Extreme, 8.0, largest), (false, true));
         assert_eq!(within(TimeOf::Shape, 8.0, largest), (true, false));
+    }
+
+    #[test]
+    fn the_limit_of_a_curve_through_points_is_known_by_its_first_term() {
+        // An outline of 27 points, member 1: the term in h⁴ is small by chance.
+        let levels = vec![0.135_888_47, 0.134_833_33, 0.134_321_61];
+        let limit = |terms: Terms| {
+            let (points, own) = (vec![48, 68, 96], 0.134_321_61);
+            Limit::of(&Times { points, own, turn: 0.158, length: 7.61, terms, excess: 8.5e-3, ..times(levels.clone()) })
+        };
+        let off = |terms: Terms| (limit(terms).t - 0.133_802).abs() / limit(terms).error;
+        assert!(off(Terms::Points) < 1.0 && off(Terms::Plain) > 5.0, "{:?}", limit(Terms::Points));
     }
 
     #[test]

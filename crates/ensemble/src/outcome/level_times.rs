@@ -4,7 +4,7 @@ use super::levels::{LevelRow, RefinementLevel, tolerance};
 use crate::{Outcome, Spec, Variation, request::spec::Pace, theory::vanishing::LITTLE_EXCESS};
 use curvelax_base::error::Result;
 use curvelax_flow::number::Precision;
-use curvelax_statistics::{Limit, SHARE_OF_STEPS, TimeOf, Times};
+use curvelax_statistics::{Limit, SHARE_OF_STEPS, Terms, TimeOf, Times};
 
 /// Errors of a time in f32: of its steps, relative, and of the nodes over the amplitude of the shape, in units of ε.
 const OF_STEPS: f64 = 5e-5;
@@ -125,7 +125,14 @@ impl Ladder {
         let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
         let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
-        let (levels, is_plain) = (times, spec.turns() == 1.0 && !spec.has_crystals());
+        let levels = times;
+        let terms = if spec.shape.typical().is_outline() {
+            Terms::Points
+        } else if spec.turns() == 1.0 && !spec.has_crystals() {
+            Terms::Plain
+        } else {
+            Terms::Waves
+        };
         let limit = Limit::of(&Times {
             of: reached,
             own,
@@ -138,7 +145,7 @@ impl Ladder {
             turn,
             length: finest.length,
             excess,
-            is_plain,
+            terms,
         });
         // What happens right after the start of a curve that its nodes do not resolve may tend below 0.
         (limit.t > 0.0 && limit.error.is_finite()).then_some(limit)
