@@ -340,7 +340,7 @@ mod tests {
 
     #[test]
     fn what_holds_at_the_start_has_the_limit_0() {
-        let spec = Spec::from_toml("adaptive = 1e-3\nrefine = true").unwrap();
+        let spec = Spec::from_toml("adaptive = 1e-3\nrefine = true\nevent = ['early = excess <= 1']").unwrap();
         let judged = |at_levels: [f64; 3]| {
             let mut times = LevelTimes::default();
             for (level, t) in RefinementLevel::FIRST.into_iter().zip(at_levels) {
