@@ -72,6 +72,12 @@ fn family(seed: u64, index: u32) -> String {
     )
 }
 
+/// NaN if there are none.
+fn median_and_largest(mut values: Vec<f64>) -> [f64; 2] {
+    values.sort_by(f64::total_cmp);
+    [values.get(values.len() / 2), values.last()].map(|value| value.copied().unwrap_or(f64::NAN))
+}
+
 /// What the members of a family are off by, in units of their half-widths.
 struct Coverage {
     bars: Vec<f64>,
@@ -92,9 +98,8 @@ impl Coverage {
         let known: Vec<&RefereeRow> = rows.iter().filter(|row| row.bars().is_some()).collect();
         let bars: Vec<f64> = known.iter().map(|row| row.bars().unwrap().abs()).collect();
         let median = |of: &dyn Fn(&RefereeRow) -> f64| {
-            let mut values: Vec<f64> = known.iter().map(|row| of(row)).collect();
-            values.sort_by(f64::total_cmp);
-            values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+            let [median, _] = median_and_largest(known.iter().map(|row| of(row)).collect());
+            median
         };
         let (error, bar) =
             (median(&|row| row.error().unwrap().abs()), median(&|row| row.t_error.unwrap() / row.t.unwrap()));
@@ -193,11 +198,8 @@ fn limits_of_events_of_families_are_within_their_errors() {
     for (event, name) in EVENTS.into_iter().enumerate() {
         let own: Vec<&LimitOfEvent> = families.iter().flat_map(|family| &family[event]).collect();
         let within = |share: f64| own.iter().filter(|limit| limit.off <= share * limit.error).count();
-        let ranked = |of: &dyn Fn(&LimitOfEvent) -> f64| {
-            let mut values: Vec<f64> = own.iter().map(|limit| of(limit)).collect();
-            values.sort_by(f64::total_cmp);
-            [values.get(values.len() / 2), values.last()].map(|value| value.copied().unwrap_or(f64::NAN))
-        };
+        let ranked =
+            |of: &dyn Fn(&LimitOfEvent) -> f64| median_and_largest(own.iter().map(|limit| of(limit)).collect());
         let ([_, worst], [relative, _]) =
             (ranked(&|limit| limit.off / limit.error), ranked(&|limit| limit.error / limit.t));
         let [wide, _] = ranked(&|limit| limit.error / limit.off);

@@ -125,7 +125,6 @@ impl Ladder {
         let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
         let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
-        let levels = times;
         let terms = if spec.shape.typical().is_outline() {
             Terms::Points
         } else if spec.turns() == 1.0 && !spec.has_crystals() {
@@ -136,7 +135,7 @@ impl Ladder {
         let limit = Limit::of(&Times {
             of: reached,
             own,
-            levels,
+            levels: times,
             points,
             rounding,
             own_level,
@@ -324,6 +323,11 @@ fn rank(level: RefinementLevel) -> usize {
 mod tests {
     use super::*;
 
+    /// A row of a curve near a unit circle.
+    fn row() -> LevelRow {
+        LevelRow { excess_start: 0.2, length_start: 6.3, ..LevelRow::default() }
+    }
+
     /// Whether a member that turns by `turn` at a node of 100 needs more of them, with times of order two.
     fn needs(text: &str, turn: f64) -> bool {
         let spec = Spec::from_toml(&format!("points = 100\nadaptive = 1e-3\n{text}")).unwrap();
@@ -331,9 +335,7 @@ mod tests {
         for level in RefinementLevel::FIRST {
             let n = level.points(100) as f64;
             let (level, turn, t_relax) = (level.number(), turn * 100.0 / n, Some(1.0 + 4.0 / (n * n)));
-            times
-                .add(&LevelRow { level, turn, t_relax, excess_start: 0.2, length_start: 6.3, ..LevelRow::default() })
-                .unwrap();
+            times.add(&LevelRow { level, turn, t_relax, ..row() }).unwrap();
         }
         times.needs(&spec, 0, RefinementLevel::of_number(4).unwrap())
     }
@@ -344,14 +346,8 @@ mod tests {
         let judged = |at_levels: [f64; 3]| {
             let mut times = LevelTimes::default();
             for (level, t) in RefinementLevel::FIRST.into_iter().zip(at_levels) {
-                let row = LevelRow {
-                    level: level.number(),
-                    t_relax: Some(t),
-                    excess_start: 0.2,
-                    length_start: 6.3,
-                    ..LevelRow::default()
-                };
-                times.add(&LevelRow { events: vec![Some(t)], ..row }).unwrap();
+                let (level, t_relax, events) = (level.number(), Some(t), vec![Some(t)]);
+                times.add(&LevelRow { level, t_relax, events, ..row() }).unwrap();
             }
             let mut own = Outcome { t_relax: Some(0.0), events: vec![Some(0.0)], ..Outcome::default() };
             times.judge(&spec, &mut own);
@@ -369,15 +365,7 @@ mod tests {
         let needs = |last: f64| {
             let mut times = LevelTimes::default();
             for (level, t) in (1..).zip([0.3, 0.2, 0.1, last]) {
-                times
-                    .add(&LevelRow {
-                        level,
-                        t_relax: Some(t),
-                        excess_start: 0.2,
-                        length_start: 6.3,
-                        ..LevelRow::default()
-                    })
-                    .unwrap();
+                times.add(&LevelRow { level, t_relax: Some(t), ..row() }).unwrap();
             }
             times.needs(&spec, 0, RefinementLevel::of_number(5).unwrap())
         };
@@ -391,9 +379,8 @@ mod tests {
             let mut times = LevelTimes::default();
             for level in RefinementLevel::FIRST {
                 let n = level.points(100) as f64;
-                let row =
-                    LevelRow { level: level.number(), excess_start: 0.2, length_start: 6.3, ..LevelRow::default() };
-                times.add(&LevelRow { t_relax: Some(at_infinity + 10.0 / (n * n)), ..row }).unwrap();
+                let (level, t_relax) = (level.number(), Some(at_infinity + 10.0 / (n * n)));
+                times.add(&LevelRow { level, t_relax, ..row() }).unwrap();
             }
             let mut own = Outcome { t_relax: Some(at_infinity + 1e-3), ..Outcome::default() };
             times.judge(&spec, &mut own);

@@ -95,7 +95,8 @@ pub fn relaxation_truth(cell: &Cell, index: u64) -> Result<Truth> {
     }
     let (point, own) = family.curve(index)?;
     let referee = Referee::new(point, &own.unwrap_or_else(|| spec.typical().flow.into_owned()))?;
-    let (threshold, excess) = (spec.threshold(referee.excess()), referee.excess());
+    let excess = referee.excess();
+    let threshold = spec.threshold(excess);
     if excess <= threshold {
         let [excess, threshold] = [excess, threshold].map(|value| significant(value, 3));
         return Err(Error::Request(format!(
