@@ -1,4 +1,4 @@
-// The adaptive step: the paper's scheme with 1, 2, ... J parts, extrapolated to order J. Twin of
+// The adaptive step: rows of ever more of the paper's steps, extrapolated to order J. Twin of
 // crates/flow/src/scheme/extrapolation.rs.
 
 const LEAST_ORDER = 2u;
@@ -11,15 +11,24 @@ const NOISE_OF_SCALE = 20.0;
 /// The same of the curvature of a polygon, towards which a curve may be pulled, in units of `(n/L)²`.
 const NOISE_OF_POLYGON = 2.2351741790771484e-9;
 
+/// The parts of a row.
+fn divisions(row: u32) -> u32 {
+    let beyond = select(0u, max(row, 3u) - 3u, IS_SHORT);
+    return row + beyond * (beyond + 1u) / 2u;
+}
+
 /// The steps of the paper that a step of order `order` makes.
-fn parts(order: u32) -> u32 { return order * (order + 1u) / 2u; }
+fn parts(order: u32) -> u32 {
+    let beyond = select(0u, max(order, 3u) - 3u, IS_SHORT);
+    return order * (order + 1u) / 2u + beyond * (beyond + 1u) * (beyond + 2u) / 6u;
+}
 
 /// The weight of `row` in the combination of the rows from `lowest` to `order`.
 fn weight(row: u32, lowest: u32, order: u32) -> real {
-    let own = real(row);
+    let own = real(divisions(row));
     var weight = select(real(0.0), real(1.0), lowest <= row && row <= order);
     for (var other = lowest; other <= order; other++) {
-        if other != row { weight = weight * (own / (own - real(other))); }
+        if other != row { weight = weight * (own / (own - real(divisions(other)))); }
     }
     return weight;
 }
@@ -30,7 +39,7 @@ struct Shares { value: real, slope: real, bend: real, gap: real, lower_gap: real
 
 /// The shares of a part of `row`, `left` parts before its end.
 fn shares_of(row: u32, left: u32, order: u32) -> Shares {
-    let own = real(row);
+    let own = real(divisions(row));
     let whole = weight(row, 1u, order);
     let upper = weight(row, LEAST_ORDER, order);
     let square = own * own * upper;
@@ -59,8 +68,9 @@ fn place_of(part: u32) -> Place {
 /// Prepares a part of an attempt. The plan is read where it is needed, so that it takes no registers.
 fn begin_part(part: u32) {
     let place = place_of(part);
-    tau = plan.length / real(place.row);
-    curve = select(PART, CURVE, place.left + 1u == place.row);
+    let count = divisions(place.row);
+    tau = plan.length / real(count);
+    curve = select(PART, CURVE, place.left + 1u == count);
 }
 
 /// Stores the curve at the end of a part, adds it to the combinations, and prepares the solves of the next part.
@@ -70,7 +80,7 @@ fn end_part(part: u32) {
     store_fields(PART, here(new_x), here(new_y), new_k, new_r);
     let place = place_of(part);
     if place.left < SHARED_PARTS { add_part(place.left, shares_of(place.row, place.left, plan.order)); }
-    if place.left > 0u { after_step(); } else { begin_row(plan.length / real(place.row + 1u), plan.taken); }
+    if place.left > 0u { after_step(); } else { begin_row(plan.length / real(divisions(place.row + 1u)), plan.taken); }
 }
 
 /// Adds the curve at the end of a part, `left` parts before the end of its row.

@@ -27,8 +27,10 @@ import scheme  # noqa: E402
 MULTIPROCESSORS, HERTZ = 132, 1.7e9
 REGISTERS_OF_A_SCHEDULER = 16384
 FIXED_STEP, OMEGA = 1e-3, 10.0
-# The largest order of an adaptive step in f32, as in crates/flow/src/scheme/extrapolation.rs; the attempts have it.
-MOST_ORDER = 4
+# The parts of the rows of an adaptive step of the largest order in f32, as in crates/flow/src/scheme/extrapolation.rs;
+# the attempts have it.
+DIVISIONS = [1, 2, 3, 5, 8, 12]
+MOST_ORDER = len(DIVISIONS)
 AGREES = 1e-4
 # The bits of the place at 0, and steps in a unit, as in shaders/place_fixed.wgsl.
 ORIGIN, PER_UNIT = 0x40000000, 2.0**27
@@ -151,7 +153,7 @@ def direct(kernel):
 def adaptive(kernel):
     """An attempt of an adaptive step of the highest order, by how often its solutions are refined; one with the fit of
     the decay."""
-    parts = MOST_ORDER * (MOST_ORDER + 1) // 2
+    parts = sum(DIVISIONS)
     refined = [f", {often}" for often in ("not refined", "refined once", "refined twice", "refined three times")]
     rows = [(what, length, {}) for what, length in zip(refined, kernel.lengths_by_refinements())]
     rows.append((refined[0] + ", decay fitted", rows[0][1], {"fit_from": 1.0, "fit_to": 0.0}))

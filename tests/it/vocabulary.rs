@@ -16,7 +16,7 @@ const EXTENSIONS: [&str; 8] = ["rs", "wgsl", "py", "pyi", "js", "css", "html", "
 /// Built or foreign files.
 const SKIPPED: [&str; 5] = ["target", "node_modules", "data", "corpus", ".venv"];
 /// Constants that still have names of their own: where the scheme and its kernel use them.
-const KEPT: [&str; 4] = ["MOST_WAVES", "MOST_ORDER", "MOST_ORDER_F32", "LEAST_ORDER"];
+const KEPT: [&str; 3] = ["MOST_WAVES", "MOST_ORDER", "LEAST_ORDER"];
 /// Where comments still have the words of the last lines of the table.
 const UNREVISED: [&str; 2] = ["crates/flow/src/scheme/", "shaders/"];
 

@@ -15,7 +15,7 @@ use curvelax_backend::{
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::{
     scheme::{
-        Parameters, State, extrapolation,
+        Parameters, State,
         member::{Counters, Report},
         run::Run,
         step::Method,
@@ -68,10 +68,7 @@ impl WebGpu {
             blocks,
             variant,
             mirror: Mirror::new(blocks, members),
-            caps: Caps {
-                max_sweeps: method.max_sweeps,
-                most_order: method.most_order.min(extrapolation::most_order(f32::EPSILON.into())),
-            },
+            caps: Caps { max_sweeps: method.max_sweeps, most_order: method.most_order },
             budget: Budget::first(method.solver, most),
             most,
             writes: RefCell::default(),

@@ -25,7 +25,8 @@ use curvelax_base::{
 use curvelax_flow::{
     number::Real,
     scheme::{
-        Parameters, State, extrapolation,
+        Parameters, State,
+        extrapolation::MOST_ORDER,
         member::{Counters, Report},
         run::Run,
     },
@@ -112,7 +113,7 @@ impl<T: Real> Kernel<T> {
             pipeline,
             batches,
             slots_per_batch: slots,
-            caps: Caps { max_sweeps, most_order: extrapolation::most_order(T::EPSILON) },
+            caps: Caps { max_sweeps, most_order: MOST_ORDER },
             solver: variant.solver,
             watched: variant.watched,
             budget: Budget::first(variant.solver, most),
@@ -133,7 +134,7 @@ impl<T: Real> Kernel<T> {
 
     /// Changes the caps on the sweeps of a solve and on the order of a step.
     pub fn with_caps(mut self, max_sweeps: u32, most_order: u32) -> Self {
-        self.caps = Caps { max_sweeps, most_order: most_order.min(extrapolation::most_order(T::EPSILON)) };
+        self.caps = Caps { max_sweeps, most_order };
         self
     }
 

@@ -20,7 +20,6 @@ use curvelax_flow::{
     forcing::Forcing,
     scheme::{
         Parameters, State,
-        extrapolation::most_order,
         run::{FIRST_ORDER, Run},
     },
 };
@@ -60,8 +59,7 @@ impl<'a> Trajectory<'a> {
             parameters.compare_with(&nodes);
         }
         let mut launch = Run::new(State::with_offset(&nodes, parameters.r_offset), parameters);
-        launch.counters.order =
-            FIRST_ORDER.min(most_order(precision.epsilon())).min(spec.most_order.unwrap_or(FIRST_ORDER));
+        launch.counters.order = FIRST_ORDER.min(spec.most_order.unwrap_or(FIRST_ORDER));
         let turning = launch.report.progress.turning;
         let resolution = resolution(precision, parameters.branches().law.is_crystal());
         let watches = Watch::of(&spec.event, &launch.report.now, unit, precision, resolution);

@@ -252,8 +252,9 @@ impl<N: Number> Team<N> {
         }
         for row in 1..=most {
             let busy = ok.and(N::of(f64::from(row)).le(orders));
-            parameters.tau = if branches.adaptive { h / N::of(f64::from(row)) } else { h };
-            for part in 1..=row {
+            let parts = if branches.adaptive { extrapolation::divisions::<N::Real>(row) } else { 1 };
+            parameters.tau = h / N::of(f64::from(parts));
+            for part in 1..=parts {
                 let busy = busy.and(ok);
                 if branches.adaptive && S::FACTS.sweeps {
                     start_part(state, runs, parameters.tau, part);
@@ -268,7 +269,7 @@ impl<N: Number> Team<N> {
                 all.sweeps_x += N::select(busy, stepped.sweeps_x, none);
                 ok = all.finite.and(all.solved);
                 if branches.adaptive && ok.any() {
-                    let left = row - part;
+                    let left = parts - part;
                     if left < SHARED_PARTS {
                         let shares = shares.in_lanes(runs, row, left);
                         extrapolation::add_part(state, &work.new, left, &shares, busy, branches);
@@ -307,7 +308,7 @@ impl<N: Number> Team<N> {
             }
             count_sweeps(&mut run.counters, &attempt.stepped, lane);
             let (stride, errors) = (self.strides[lane], attempt.errors.map(|error| error.lane(lane)));
-            run.counters.solves += if adaptive { extrapolation::parts(run.counters.order) } else { 1 };
+            run.counters.solves += if adaptive { extrapolation::parts::<N::Real>(run.counters.order) } else { 1 };
             let of_solves = failure_of_solves(&attempt.stepped, lane);
             let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
             let length = run.report.now.length;
@@ -319,7 +320,7 @@ impl<N: Number> Team<N> {
                     &run.parameters,
                     branches.is_refined::<N>(),
                 ),
-                order: most_order.min(extrapolation::most_order(N::Real::EPSILON)),
+                order: most_order,
             });
             if let Some(allowed) = allowed
                 && of_solves.is_none()

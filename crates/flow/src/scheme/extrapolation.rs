@@ -1,10 +1,10 @@
-//! The adaptive step: the paper's scheme with 1, 2, … J parts, extrapolated to order J. Twin of
+//! The adaptive step: rows of ever more of the paper's steps, extrapolated to order J. Twin of
 //! `shaders/extrapolation.wgsl`.
 //!
-//! Row j is the result of j steps of the paper of length h/j. The scheme is of first order, and its error has an
-//! expansion in powers of the length of the parts, so the Aitken–Neville combination of the first J rows is of order
-//! J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9). With the harmonic sequence
-//! its weights are `w_j = Π_{i≠j} j/(j-i)`. The rows from 2 to J give order J-1, and the difference between the two
+//! Row j is the result of [`divisions`] n_j steps of the paper of length h/n_j, its parts. The scheme is of first order,
+//! and its error has an expansion in powers of the length of the parts, so the Aitken–Neville combination of the first
+//! J rows is of order J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9), with the
+//! weights `w_j = Π_{i≠j} n_j/(n_j - n_i)`. The rows from 2 to J give order J-1, and the difference between the two
 //! measures the error. All of x, y, k and r are combined, each by itself.
 //!
 //! Backward differences at the ends of the rows are combined in the same way: the first and second derivatives at the
@@ -28,8 +28,6 @@ use crate::{
 pub const LEAST_ORDER: u32 = 2;
 /// Highest order of a step.
 pub const MOST_ORDER: u32 = 6;
-/// Highest order in f32: weights grow with the order, and with them the rounding of the parts.
-pub const MOST_ORDER_F32: u32 = 4;
 
 /// Weight of an error of the nodes over one of the curvature, both relative. A mode m of the curve has m²-1 times as
 /// much of it in the curvature.
@@ -47,23 +45,30 @@ pub const NOISE_OF_POLYGON: f64 = 0.3 * STEP as f64;
 /// The last parts of a row, which go into the combinations.
 pub const SHARED_PARTS: u32 = 3;
 
-/// The steps of the paper that a step of order `order` makes.
-pub fn parts(order: u32) -> u32 {
-    order * (order + 1) / 2
+/// Returns the parts of `row`: 1, 2, 3, 4, 5, 6, and in short numbers 1, 2, 3, 5, 8, 12. The farther apart they are, the
+/// smaller the weights of the rows, which multiply the rounding of the parts.
+pub fn divisions<T: Real>(row: u32) -> u32 {
+    divided(row, T::IS_SHORT)
 }
 
-/// Highest order of a step in numbers of this machine epsilon.
-pub fn most_order(epsilon: f64) -> u32 {
-    if epsilon > 1e-10 { MOST_ORDER_F32 } else { MOST_ORDER }
+fn divided(row: u32, short: bool) -> u32 {
+    let beyond = if short { row.saturating_sub(3) } else { 0 };
+    row + beyond * (beyond + 1) / 2
 }
 
-/// The weight of `row` in the combination of the rows from `first` to `order`.
-fn weight<T: Real>(row: u32, first: u32, order: u32) -> T {
-    let own = T::of(f64::from(row));
+/// Returns the steps of the paper that a step of order `order` makes.
+pub fn parts<T: Real>(order: u32) -> u32 {
+    (1..=order).map(divisions::<T>).sum()
+}
+
+/// The weight of `row` in the combination of the rows from `first` to `order`, which have `divisions` parts.
+fn weight<T: Real>(row: u32, first: u32, order: u32, divisions: impl Fn(u32) -> u32) -> T {
+    let of = |row| T::of(f64::from(divisions(row)));
+    let own = of(row);
     let mut weight = T::of(if first <= row && row <= order { 1.0 } else { 0.0 });
     for other in first..=order {
         if other != row {
-            weight = weight * (own / (own - T::of(f64::from(other))));
+            weight = weight * (own / (own - of(other)));
         }
     }
     weight
@@ -71,8 +76,8 @@ fn weight<T: Real>(row: u32, first: u32, order: u32) -> T {
 
 /// How much larger the rounding of a step of order `order` is than that of one of the paper's: each part adds its own,
 /// and the weights of the rows multiply them.
-pub fn roundings(order: u32) -> f64 {
-    let of_row = |row| f64::from(row) * weight::<f64>(row, 1, order).powi(2);
+pub fn roundings<T: Real>(order: u32) -> f64 {
+    let of_row = |row| f64::from(divisions::<T>(row)) * weight::<f64>(row, 1, order, divisions::<T>).powi(2);
     (1..=order).map(of_row).sum::<f64>().sqrt()
 }
 
@@ -92,19 +97,18 @@ pub struct Shares<N> {
 }
 
 impl<T: Real> Shares<T> {
-    /// The shares of a part of `row`, `left` parts before its end, in a step of order `order`.
-    pub fn of(row: u32, left: u32, order: u32) -> Shares<T> {
-        let own = T::of(f64::from(row));
+    /// The shares of a part of `row`, `left` parts before its end, in a step of order `order` whose rows have
+    /// `divisions` parts.
+    fn of(row: u32, left: u32, order: u32, divisions: impl Fn(u32) -> u32) -> Shares<T> {
+        let own = T::of(f64::from(divisions(row)));
         let zero = T::of(0.0);
-        let (whole, upper) = (weight::<T>(row, 1, order), weight::<T>(row, LEAST_ORDER, order));
+        let weight = |first, order| weight::<T>(row, first, order, &divisions);
+        let (whole, upper) = (weight(1, order), weight(LEAST_ORDER, order));
         let square = own * own * upper;
         match left {
             0 => {
-                let lower = if order > LEAST_ORDER {
-                    weight::<T>(row, 1, order - 1) - weight::<T>(row, LEAST_ORDER, order - 1)
-                } else {
-                    zero
-                };
+                let lower =
+                    if order > LEAST_ORDER { weight(1, order - 1) - weight(LEAST_ORDER, order - 1) } else { zero };
                 Shares { value: whole, slope: own * whole, bend: square, gap: whole - upper, lower_gap: lower }
             }
             1 => Shares { slope: -(own * whole), bend: -(square + square), ..Shares::default() },
@@ -134,7 +138,7 @@ impl<T: Real> AllShares<T> {
     pub fn computed() -> AllShares<T> {
         let rows = (0..=MOST_ORDER).flat_map(|order| (0..=MOST_ORDER).map(move |row| (order, row)));
         let parts = rows.flat_map(|(order, row)| (0..SHARED_PARTS).map(move |left| (order, row, left)));
-        AllShares(parts.map(|(order, row, left)| Shares::of(row, left, order)).collect())
+        AllShares(parts.map(|(order, row, left)| Shares::of(row, left, order, divisions::<T>)).collect())
     }
 
     /// Returns those of a part in every lane, by its order.
@@ -304,15 +308,21 @@ pub fn errors_of_attempt<N: Number>(
 mod tests {
     use super::{super::forcing::DAMPING, *};
 
+    /// The orders of steps in long and in short numbers.
+    fn all_orders() -> impl Iterator<Item = (u32, bool)> {
+        (LEAST_ORDER..=MOST_ORDER).flat_map(|order| [(order, false), (order, true)])
+    }
+
     /// The end, the derivative and the second derivative of a step of length h for y' = -y², y(0) = 1, by the explicit
     /// Euler method, and the two errors.
-    fn step(h: f64, order: u32) -> [f64; 5] {
+    fn step(h: f64, order: u32, short: bool) -> [f64; 5] {
         let mut all = [1.0, 0.0, 0.0, 0.0, 0.0];
         for row in 1..=order {
             let mut y = 1.0;
-            for part in 1..=row {
-                y -= h / f64::from(row) * y * y;
-                let shares = Shares::<f64>::of(row, row - part, order);
+            let parts = divided(row, short);
+            for part in 1..=parts {
+                y -= h / f64::from(parts) * y * y;
+                let shares = Shares::<f64>::of(row, parts - part, order, |row| divided(row, short));
                 let [value, slope, bend, gap, lower] =
                     [shares.value, shares.slope, shares.bend, shares.gap, shares.lower_gap];
                 for (sum, share) in all.iter_mut().zip([value, slope, bend, gap, lower]) {
@@ -325,9 +335,9 @@ mod tests {
 
     #[test]
     fn combinations_have_their_orders() {
-        for order in LEAST_ORDER..=MOST_ORDER {
+        for (order, short) in all_orders() {
             let errors = [0.04, 0.02].map(|h: f64| {
-                let [value, slope, bend, gap, lower] = step(h, order);
+                let [value, slope, bend, gap, lower] = step(h, order, short);
                 let y = 1.0 / (1.0 + h);
                 [value - y, slope + h * y * y, bend - 2.0 * h * h * y * y * y, gap, lower]
             });
@@ -343,13 +353,16 @@ mod tests {
     }
 
     /// The largest factor by which a step of this order multiplies a mode of a driven circle.
-    fn most_amplified(order: u32, damping: f64) -> f64 {
+    fn most_amplified(order: u32, short: bool, damping: f64) -> f64 {
         let mut most = 0.0_f64;
         for (mode, tenths) in (2..40).flat_map(|mode| (-50..80).map(move |tenths| (mode, tenths))) {
             let (m, h) = (f64::from(mode), 10f64.powf(f64::from(tenths) / 10.0));
             let own = |tau: f64, k: f64| 1.0 / (1.0 + tau * (k.powi(4) + damping * k * k));
             let part = |tau: f64| 1.0 - 0.5 * m * m * (m * m - 1.0) * tau * (own(tau, m + 1.0) + own(tau, m - 1.0));
-            let row = |j: u32| weight::<f64>(j, 1, order) * part(h / f64::from(j)).powi(j as i32);
+            let row = |j: u32| {
+                let parts = divided(j, short);
+                weight::<f64>(j, 1, order, |row| divided(row, short)) * part(h / f64::from(parts)).powi(parts as i32)
+            };
             most = most.max((1..=order).map(row).sum::<f64>().abs());
         }
         most
@@ -357,19 +370,29 @@ mod tests {
 
     #[test]
     fn no_mode_of_a_driven_circle_grows_in_a_step_of_any_length_and_order() {
-        for order in LEAST_ORDER..=MOST_ORDER {
-            let (own, less) = (most_amplified(order, DAMPING), most_amplified(order, 3.0));
-            assert!(own <= 1.0 && less > 1.1, "order {order}: {own} {less}");
+        for (order, short) in all_orders() {
+            let too_little = if short { 1.0 } else { 3.0 };
+            let [own, less] = [DAMPING, too_little].map(|damping| most_amplified(order, short, damping));
+            assert!(own <= 1.0 && less > 1.1, "order {order}, short {short}: {own} {less}");
         }
     }
 
     #[test]
     fn weights_add_up_to_one() {
-        for order in LEAST_ORDER..=MOST_ORDER {
-            let sum = |first: u32| (1..=order).map(|row| weight::<f64>(row, first, order)).sum::<f64>();
-            assert!((sum(1) - 1.0).abs() < 1e-13 && (sum(2) - 1.0).abs() < 1e-13, "{order}");
+        for (order, short) in all_orders() {
+            let sum = |first: u32| {
+                (1..=order).map(|row| weight::<f64>(row, first, order, |row| divided(row, short))).sum::<f64>()
+            };
+            assert!((sum(1) - 1.0).abs() < 1e-13 && (sum(2) - 1.0).abs() < 1e-13, "{order} {short}");
         }
-        assert_eq!(weight::<f64>(1, 1, 2), -1.0, "step doubling");
-        assert_eq!(weight::<f64>(2, 1, 2), 2.0, "step doubling");
+        assert_eq!([1, 2].map(|row| weight::<f64>(row, 1, 2, divisions::<f64>)), [-1.0, 2.0], "step doubling");
+    }
+
+    #[test]
+    fn rounding_grows_less_with_the_order_in_short_numbers() {
+        assert_eq!([4, 5, 6].map(parts::<f64>), [10, 15, 21]);
+        assert_eq!([4, 5, 6].map(parts::<f32>), [11, 19, 31]);
+        assert_eq!([4, 5, 6].map(|order| roundings::<f64>(order).round()), [32.0, 109.0, 375.0]);
+        assert_eq!([4, 5, 6].map(|order| roundings::<f32>(order).round()), [17.0, 28.0, 50.0]);
     }
 }

@@ -152,7 +152,7 @@ pub fn aim<T: Real>(fall: T, slope: T, bend: T, taken: T) -> T {
 
 /// Returns the work of a step of order `order` and of this ratio to the last one, for the same progress.
 fn work<T: Real>(order: u32, ratio: T) -> T {
-    T::of(f64::from(parts(order))) / ratio
+    T::of(f64::from(parts::<T>(order))) / ratio
 }
 
 /// Returns the length and the order after a step of length `length` and order `order`, with the errors of that order
@@ -173,7 +173,7 @@ pub fn choose<T: Real>(length: T, order: u32, errors: [T; 2], most_growth: T, al
         return (length * own, order);
     }
     // The next order is taken to need as much work for the same progress.
-    let longer = T::of(f64::from(parts(order + 1))) / T::of(f64::from(parts(order)));
+    let longer = T::of(f64::from(parts::<T>(order + 1))) / T::of(f64::from(parts::<T>(order)));
     (length * (own * longer).min(most_growth), order + 1)
 }
 

@@ -11,7 +11,6 @@ use curvelax_flow::{
     number::Precision,
     scheme::{
         Parameters, State,
-        extrapolation::most_order,
         run::{FIRST_ORDER, Run},
     },
 };
@@ -207,7 +206,7 @@ pub fn adaptive_members(
         // One member in four begins with a step that is far too long and is refused.
         progress.next = if j % 4 == 2 { end } else { 0.05 * p.tau };
         run.counters.goal = u32::MAX;
-        run.counters.order = FIRST_ORDER.min(most_order(precision.epsilon()));
+        run.counters.order = FIRST_ORDER;
     }
     Ok(runs)
 }

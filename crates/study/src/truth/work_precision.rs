@@ -12,7 +12,7 @@ use curvelax_ensemble::{
     request::spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Precision, Pull, Solver},
     simulate::simulate,
 };
-use curvelax_flow::scheme::extrapolation::{LEAST_ORDER, MOST_ORDER, most_order};
+use curvelax_flow::scheme::extrapolation::{LEAST_ORDER, MOST_ORDER};
 use curvelax_statistics::Description;
 
 /// How much is run.
@@ -157,7 +157,7 @@ impl WorkPrecision {
     /// of rising order.
     pub fn ways(&self, solver: Solver) -> Vec<Vec<Stepping>> {
         let fixed = STEPS.map(Stepping::Fixed).to_vec();
-        let orders = LEAST_ORDER..=most_order(self.precision.epsilon());
+        let orders = LEAST_ORDER..=MOST_ORDER;
         let step = |tolerance: &f64, most_order| Stepping::Adaptive { tolerance: *tolerance, most_order };
         let adaptive =
             |most_order| Effort::of(solver).tolerances.iter().map(|tolerance| step(tolerance, most_order)).collect();

@@ -137,7 +137,7 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         at.parameters.tau = at.parameters.tau.max(twin.longest);
         let scales = Scales::of(&at)?;
         let grown = growth(twin.left.counters.steps);
-        let amplified = if adaptive { extrapolation::roundings(twin.order) } else { 1.0 };
+        let amplified = if adaptive { extrapolation::roundings::<T>(twin.order) } else { 1.0 };
         let roundings = grown * amplified;
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());

@@ -15,7 +15,7 @@ use crate::conformance::{
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::{
-    number::BIG,
+    number::{BIG, Real},
     scheme::{extrapolation, member::Observed, run::Run, step::Method},
     solver::Solver,
 };
@@ -61,7 +61,7 @@ fn watched<T: Evolves>(launches: &[Run<f64>], method: &Method, n: usize) -> Resu
     let of = |(member, launch): (usize, &Run<f64>)| {
         let Twin { left, order, .. } = twin::<T>(launch, method, n)?;
         let scales = Scales::of(launch)?;
-        let rounding = T::EPSILON * roundings(left.counters.steps, order, launch.parameters.adaptive > 0.0);
+        let rounding = T::EPSILON * roundings::<T>(left.counters.steps, order, launch.parameters.adaptive > 0.0);
         let (start, end) = (launch.report.now.to_numbers(), left.report.now.to_numbers());
         let clear =
             |place: &usize| (end[*place] - start[*place]).abs() > CLEAR * rounding * scales.get(REPORT[*place].scale);
@@ -81,8 +81,8 @@ fn watched<T: Evolves>(launches: &[Run<f64>], method: &Method, n: usize) -> Resu
 }
 
 /// By how much rounding grows in so many steps.
-fn roundings(steps: u32, order: u32, adaptive: bool) -> f64 {
-    growth(steps) * if adaptive { extrapolation::roundings(order) } else { 1.0 }
+fn roundings<T: Real>(steps: u32, order: u32, adaptive: bool) -> f64 {
+    growth(steps) * if adaptive { extrapolation::roundings::<T>(order) } else { 1.0 }
 }
 
 /// Compares the times of the events, see [`EVENT`].
@@ -102,7 +102,7 @@ fn agree<T: Evolves>(
         let mut at = launch.clone();
         at.parameters.tau = at.parameters.tau.max(longest);
         let scales = Scales::of(&at)?;
-        let roundings = T::EPSILON * roundings(theirs.counters.steps, order, adaptive);
+        let roundings = T::EPSILON * roundings::<T>(theirs.counters.steps, order, adaptive);
         let (a, b) = (Crossing::of(launch, ours, place, level), Crossing::of(launch, &theirs, place, level));
         let bound: &Bound = &REPORT[place];
         let rounding = bound.factor(hardware) * roundings * scales.get(bound.scale);
