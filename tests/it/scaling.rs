@@ -39,6 +39,8 @@ const COLUMNS: [(&str, i32); 19] = [
 /// Columns that must agree to rounding if the scale is not a power of two.
 const SOLID: [&str; 7] = ["t_relax", "t_half", "length_start", "length_end", "area_start", "area_end", "excess_start"];
 
+const ROUNDING: f64 = 1e-8;
+
 /// A table of points `s` times as large.
 fn outline(points: &[DVec2], s: f64) -> String {
     points.iter().fold("x,y\n".to_string(), |text, p| text + &format!("{},{}\n", s * p.x, s * p.y))
@@ -91,8 +93,11 @@ fn cells(done: &Done, count: usize) -> Vec<Vec<Row>> {
 /// What a row says once lengths are divided by s, and how far it may be off: nothing if s is a power of two.
 fn assert_scaled(what: &str, one: &Row, large: &Row, s: f64, bound: f64) {
     assert_eq!(one["status"], large["status"], "{what}, scaled by {s}");
+    // Rounding in f32 may decide whether the last step ends at t_relax or, where that is near its start, continues.
+    let ends_elsewhere =
+        bound > ROUNDING && (number(large, "t_end") / s.powi(4) / number(one, "t_end") - 1.0).abs() > bound;
     for (column, power) in COLUMNS {
-        if bound > 0.0 && !SOLID.contains(&column) {
+        if bound > 0.0 && (!SOLID.contains(&column) || (ends_elsewhere && column == "length_end")) {
             continue;
         }
         if one[column].is_empty() || large[column].is_empty() {
@@ -109,7 +114,7 @@ fn assert_scaled(what: &str, one: &Row, large: &Row, s: f64, bound: f64) {
 fn a_curve_of_any_size_relaxes_as_one_of_unit_size() {
     for name in ["ellipse", "circle", "nonconvex", "island"] {
         for pace in PACES {
-            for (precision, bound) in [("f64", 1e-8), ("f32", 1e-2)] {
+            for (precision, bound) in [("f64", ROUNDING), ("f32", 1e-2)] {
                 let what = format!("{name} {pace} {precision}");
                 let scales = [&EXACT[..], &OTHERS].concat();
                 let all = cells(&scaled(name, &scales, &format!("{pace} --precision {precision}")), scales.len());

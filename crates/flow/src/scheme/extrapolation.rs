@@ -1,11 +1,11 @@
 //! The adaptive step: rows of ever more of the paper's steps, extrapolated to order J. Twin of
 //! `shaders/extrapolation.wgsl`.
 //!
-//! Row j is the result of [`divisions`] n_j steps of the paper of length h/n_j, its parts. The scheme is of first order,
-//! and its error has an expansion in powers of the length of the parts, so the Aitken–Neville combination of the first
-//! J rows is of order J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9), with the
-//! weights `w_j = Π_{i≠j} n_j/(n_j - n_i)`. The rows from 2 to J give order J-1, and the difference between the two
-//! measures the error. All of x, y, k and r are combined, each by itself.
+//! Row j is the result of [`divisions`] n_j steps of the paper of length h/n_j, its parts. The scheme is of first
+//! order, and its error has an expansion in powers of the length of the parts, so the Aitken–Neville combination of the
+//! first J rows is of order J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9),
+//! with the weights `w_j = Π_{i≠j} n_j/(n_j - n_i)`. The rows from 2 to J give order J-1, and the difference between the
+//! two measures the error. All of x, y, k and r are combined, each by itself.
 //!
 //! Backward differences at the ends of the rows are combined in the same way: the first and second derivatives at the
 //! end of the step, from which [`dense`](super::dense) takes what lies inside steps (E. Hairer and A. Ostermann, *Dense
@@ -45,8 +45,8 @@ pub const NOISE_OF_POLYGON: f64 = 0.3 * STEP as f64;
 /// The last parts of a row, which go into the combinations.
 pub const SHARED_PARTS: u32 = 3;
 
-/// Returns the parts of `row`: 1, 2, 3, 4, 5, 6, and in short numbers 1, 2, 3, 5, 8, 12. The farther apart they are, the
-/// smaller the weights of the rows, which multiply the rounding of the parts.
+/// Returns the parts of `row`: 1, 2, 3, 4, 5, 6, and in short numbers 1, 2, 3, 5, 8, 12. The farther apart they are,
+/// the smaller the weights of the rows, which multiply the rounding of the parts.
 pub fn divisions<T: Real>(row: u32) -> u32 {
     divided(row, T::IS_SHORT)
 }
