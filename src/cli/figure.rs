@@ -14,7 +14,10 @@ use crate::{
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
-    files::{OutputFolder, Owner, tables::SnapshotTable},
+    files::{
+        OutputFolder, Owner,
+        tables::{NodeRow, Table},
+    },
     paper::{Printer, missing_letters},
     report::progress::Progress,
 };
@@ -63,9 +66,8 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     let (printer, mut missing) = (Printer::default(), BTreeSet::new());
     for (figure, spec) in &chosen {
         let ended = figure.simulate(spec, Progress::new(args.quiet))?;
-        let mut rows = SnapshotTable::new(folder.file(&file(figure, "csv"))?)?;
-        ended.rows.snapshots.iter().try_for_each(|snapshot| rows.snapshot(snapshot))?;
-        parts.push(rows.ready()?);
+        let rows: Vec<NodeRow> = ended.rows.snapshots.iter().flat_map(NodeRow::of).collect();
+        parts.push(Table::of(folder.file(&file(figure, "csv"))?, &rows)?);
         let plot = figure.plot(&ended);
         if args.paper.on_screen() {
             parts.push(folder.write(&file(figure, "svg"), plot.draw(Medium::Screen))?);

@@ -59,7 +59,7 @@ pub struct PlotArgs {
 
 impl Prints {
     /// The files of plots that may be written.
-    fn names(&self) -> impl Iterator<Item = &'static str> {
+    fn names(&self) -> impl Iterator<Item = String> {
         let of = |(extension, _): &(&'static str, _)| {
             let extension = *extension;
             names::PICTURES.into_iter().filter_map(move |name| names::on_paper(name, extension))
@@ -78,7 +78,7 @@ impl Prints {
             let made = self.of(&printer, (&picture.figure.title, &picture.figure.svg), &mut missing)?;
             for (extension, content) in made {
                 if let Some(name) = names::on_paper(picture.name, extension) {
-                    files.push(folder.write(name, content)?);
+                    files.push(folder.write(&name, content)?);
                 }
             }
         }
@@ -96,8 +96,8 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         Some(out) => (out, args.force, Owner::PicturesOfRun),
         None => (&args.run, true, Owner::PicturesOfRun),
     };
-    let names = names::PICTURES.into_iter().filter(|_| on_screen).chain(prints.names());
-    let folder = OutputFolder::open_for(out, force, owner, names.map(String::from).collect())?;
+    let names = names::PICTURES.into_iter().filter(|_| on_screen).map(String::from).chain(prints.names());
+    let folder = OutputFolder::open_for(out, force, owner, names.collect())?;
     let Finished { provenance, mut tally, excess, explained, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
         note(&format!("note: no {} in {}: without pictures of members", names::PORTRAITS, args.run.display()));

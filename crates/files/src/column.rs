@@ -8,6 +8,8 @@ use curvelax_base::error::Result;
 
 /// A row of a table, as the program holds it.
 pub trait TableRow: Sized + 'static {
+    /// The table, by its name in the folder of results.
+    const TABLE: &'static str;
     /// Its columns, from left to right.
     const COLUMNS: &'static [Column<Self>];
 }
@@ -40,11 +42,12 @@ pub enum Field<'a> {
     Word(&'a str),
 }
 
-/// The columns of a [`TableRow`], one per line: `heading: kind = path of the field, "meaning";`. The kinds are the
-/// modules below.
+/// The columns of a [`TableRow`] of a table, one per line: `heading: kind = path of the field, "meaning";`. The kinds
+/// are the modules below.
 macro_rules! columns {
-    ($record:ty: $($name:ident: $kind:ident = $($field:ident).+, $meaning:literal;)+) => {
+    ($record:ty, $table:path: $($name:ident: $kind:ident = $($field:ident).+, $meaning:literal;)+) => {
         impl $crate::column::TableRow for $record {
+            const TABLE: &'static str = $table;
             const COLUMNS: &'static [$crate::column::Column<Self>] = &[$(
                 $crate::column::Column {
                     name: stringify!($name),
@@ -63,6 +66,21 @@ macro_rules! columns {
 
 pub(super) use columns;
 
+/// A [`TableRow`] that has nothing but its columns, one per line: `heading: kind, "meaning";`.
+macro_rules! row {
+    ($(#[$doc:meta])* $record:ident, $table:path: $($name:ident: $kind:ident, $meaning:literal;)+) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, Default, PartialEq)]
+        pub struct $record {
+            $(#[doc = $meaning] pub $name: $crate::column::$kind::Value,)+
+        }
+
+        $crate::column::columns! { $record, $table: $($name: $kind = $name, $meaning;)+ }
+    };
+}
+
+pub(super) use row;
+
 /// The value, if it is known.
 pub(super) fn known(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
@@ -75,15 +93,16 @@ macro_rules! kinds {
         pub(super) mod $kind {
             use super::*;
 
+            pub type Value = $value;
             pub const HOLDS: &str = $holds;
 
             // One signature for all kinds.
             #[allow(clippy::ptr_arg)]
-            pub fn write($v: &$value) -> Field<'_> {
+            pub fn write($v: &Value) -> Field<'_> {
                 $write
             }
 
-            pub fn read($fields: &mut Fields<'_>) -> Result<$value> {
+            pub fn read($fields: &mut Fields<'_>) -> Result<Value> {
                 $read
             }
         }

@@ -18,11 +18,26 @@ pub type ColumnText = [String; 3];
 /// The columns of the table `name` of a run of `spec` with these statistics; none if it is no such table.
 ///
 /// # Errors
-/// Those of the spec, whose cells have features of their own.
+/// As [`of_growing`].
 pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Result<Vec<ColumnText>> {
     let of_cells = |columns: Vec<CellColumn>| {
         columns.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]).collect()
     };
+    Ok(match name {
+        names::ENSEMBLE => of_cells(statistics.columns(spec)),
+        names::GROUPS => of_cells(statistics.group_columns()),
+        names::EVENT_STATISTICS => of_cells(statistics.event_columns()),
+        names::EXPLAINED => of::<ExplainedRow>(),
+        names::MEAN_EXCESS => of::<MeanExcess>(),
+        _ => of_growing(name, spec)?,
+    })
+}
+
+/// The columns of a table that grows as members end, likewise.
+///
+/// # Errors
+/// Those of the spec, whose cells have features of their own.
+pub(super) fn of_growing(name: &str, spec: &Spec) -> Result<Vec<ColumnText>> {
     Ok(match name {
         names::SUMMARY => of::<Outcome>(),
         names::MEMBERS => {
@@ -32,15 +47,10 @@ pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Resu
             };
             indices.into_iter().chain(spec.all_features()?.into_iter().map(of_feature)).collect()
         }
-        names::ENSEMBLE => of_cells(statistics.columns(spec)),
-        names::GROUPS => of_cells(statistics.group_columns()),
         names::EVENTS => of::<EventRow>(),
-        names::EVENT_STATISTICS => of_cells(statistics.event_columns()),
-        names::EXPLAINED => of::<ExplainedRow>(),
         names::RATES => of::<RateRow>(),
         names::LEVELS => of::<LevelRow>(),
         names::EVENT_LEVELS => of::<EventLevelRow>(),
-        names::MEAN_EXCESS => of::<MeanExcess>(),
         names::SERIES => of::<SeriesRow>(),
         names::SNAPSHOTS => of::<NodeRow>(),
         _ => Vec::new(),

@@ -10,8 +10,8 @@ use super::{
     claim::LOCK,
     disk::{IS_STORE, entries, is_real_folder},
     names::{
-        EVENT_LEVELS, EVENT_STATISTICS, EVENTS, OUTLINES, PARQUET, PLOTS, PROBE, PYTHON_OUTLINES, RUN, SERIES,
-        SNAPSHOTS, STATE, STATE_OLD, STATE_PART, STORE, as_parquet, is_store, own, part,
+        EVENT_LEVELS, EVENT_STATISTICS, EVENTS, OUTLINES, PLOTS, PROBE, PYTHON_OUTLINES, RUN, SERIES, SNAPSHOTS, STATE,
+        STATE_OLD, STATE_PART, STORE, as_parquet, is_store, own, parquet, part,
     },
     part_folder::SUCCESSOR,
 };
@@ -28,9 +28,9 @@ pub fn foreign(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let (begun, run) = ([STATE, STATE_OLD].iter().any(there), folder.join(RUN));
     let has_run = begun || is_of_run(&run);
     let unasked = if begun { Vec::new() } else { unasked(&run) };
-    let finished = own().chain(PYTHON_OUTLINES).filter(|name| has_run && !unasked.contains(name));
-    let finished = finished.map(PathBuf::from);
-    let unfinished = own().map(|name| part(Path::new(name)));
+    let unfinished = own().into_iter().map(|name| part(Path::new(&name)));
+    let finished = own().into_iter().chain(PYTHON_OUTLINES.map(String::from));
+    let finished = finished.filter(|name| has_run && !unasked.contains(name)).map(PathBuf::from);
     let working = [LOCK, OUTLINES, PROBE, STATE, STATE_OLD, STATE_PART].map(PathBuf::from);
     let known: BTreeSet<PathBuf> = finished.chain(unfinished).chain(working).collect();
     let mut found = Vec::new();
@@ -69,7 +69,7 @@ fn is_of_run(path: &Path) -> bool {
 }
 
 /// The tables that the spec in a `run.json` does not ask for; none if it cannot be read.
-fn unasked(path: &Path) -> Vec<&'static str> {
+fn unasked(path: &Path) -> Vec<String> {
     let run = input::bytes(path, input::MAX_RUN).ok();
     let run: Option<serde_json::Value> = run.and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let Some(spec) = run.as_ref().and_then(|run| run.get("spec")) else { return Vec::new() };
@@ -84,8 +84,8 @@ fn unasked(path: &Path) -> Vec<&'static str> {
     ];
     let tables = tables.iter().filter(|(lacks, _)| *lacks).flat_map(|(_, names)| *names).copied();
     let lacks_parquet = spec.get("tables").is_none_or(|tables| tables != "parquet");
-    let parquet = PARQUET.into_iter().filter(|_| lacks_parquet);
-    tables.flat_map(|name| [Some(name), as_parquet(name)]).flatten().chain(parquet).collect()
+    let parquet = parquet().filter(|_| lacks_parquet);
+    tables.flat_map(|name| [Some(name.to_owned()), as_parquet(name)]).flatten().chain(parquet).collect()
 }
 
 fn is_hidden(path: &Path) -> bool {

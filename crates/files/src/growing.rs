@@ -1,17 +1,15 @@
 //! The files that grow as members end: tables, and the store of snapshots.
 
 use crate::{
+    column::TableRow,
+    columns::of_growing,
     folder::OutputFolder,
-    members::MemberTable,
+    members::MemberFields,
     names,
     part_file::{Mark, PartFile},
     part_folder::PartFolder,
-    place::Place,
     spill::Spill,
-    tables::{
-        EventLevelRow, EventLevelTable, EventRow, EventTable, LevelTable, RateRow, RateTable, SeriesTable,
-        SnapshotTable, SummaryTable, Table,
-    },
+    tables::{EventLevelRow, EventRow, NodeRow, RateRow, Table},
     zarr::{self, SnapshotStore},
 };
 use curvelax_base::error::{Error, Result};
@@ -19,14 +17,11 @@ use curvelax_ensemble::{Ended, Extent, LevelRow, SeriesRow, Snapshot, Spec, requ
 
 /// The growing files of a spec.
 pub struct Growing {
-    summary: SummaryTable,
-    members: MemberTable,
-    levels: LevelTable,
-    rates: RateTable,
-    /// Those of the members and those of the levels, with the names of the events.
-    events: Option<(EventTable, EventLevelTable, Vec<String>)>,
-    series: Option<SeriesTable>,
-    snapshots: Option<SnapshotTable>,
+    /// The tables of [`Growing::names`], in this order.
+    tables: Vec<Table>,
+    members: MemberFields,
+    /// The names of the events.
+    events: Vec<String>,
     store: Option<SnapshotStore>,
     /// Rows of members that are still running; created when the first of them arrive.
     spill: Option<Spill>,
@@ -102,22 +97,14 @@ impl Growing {
 
     /// The tables in the files that `file` returns.
     fn of(spec: &Spec, store: Option<SnapshotStore>, file: impl Fn(&str) -> Result<PartFile>) -> Result<Growing> {
-        let names = Growing::names(spec);
-        let asked = |name: &str| names.contains(&name).then(|| file(name)).transpose();
+        let table = |name| {
+            let columns = of_growing(name, spec)?;
+            Table::with_header(file(name)?, columns.iter().map(|[heading, ..]| &**heading))
+        };
         Ok(Growing {
-            summary: Table::new(file(names::SUMMARY)?)?,
-            members: MemberTable::new(file(names::MEMBERS)?, spec)?,
-            levels: Table::new(file(names::LEVELS)?)?,
-            rates: Table::new(file(names::RATES)?)?,
-            events: match asked(names::EVENTS)?.zip(asked(names::EVENT_LEVELS)?) {
-                Some((own, levels)) => {
-                    let names = spec.event.iter().map(|event| event.name.clone()).collect();
-                    Some((Table::new(own)?, Table::new(levels)?, names))
-                }
-                None => None,
-            },
-            series: asked(names::SERIES)?.map(Table::new).transpose()?,
-            snapshots: asked(names::SNAPSHOTS)?.map(Table::new).transpose()?,
+            tables: Growing::names(spec).into_iter().map(table).collect::<Result<_>>()?,
+            members: MemberFields::new(spec)?,
+            events: spec.event.iter().map(|event| event.name.clone()).collect(),
             store,
             spill: None,
             torn: false,
@@ -128,10 +115,8 @@ impl Growing {
     /// Writes the row of a member at a level.
     pub fn add_level(&mut self, row: &LevelRow) -> Result<()> {
         self.torn = true;
-        if let Some((_, table, names)) = &mut self.events {
-            EventLevelRow::of(row, names).try_for_each(|row| table.row(&row))?;
-        }
-        self.levels.row(row)?;
+        EventLevelRow::of(row, &self.events).try_for_each(|row| write(&mut self.tables, &row))?;
+        write(&mut self.tables, row)?;
         self.torn = false;
         Ok(())
     }
@@ -150,27 +135,22 @@ impl Growing {
         if let Some(store) = &mut self.store {
             store.member(outcome.status)?;
         }
-        self.summary.row(outcome)?;
-        self.members.row(outcome, features)?;
-        if let Some((table, _, names)) = &mut self.events {
-            EventRow::of(outcome, names, self.refined).try_for_each(|row| table.row(&row))?;
-        }
-        RateRow::of(outcome).iter().try_for_each(|row| self.rates.row(row))?;
+        let tables = &mut self.tables;
+        write(tables, outcome)?;
+        let members = self.members.of(outcome, features)?;
+        find(tables, names::MEMBERS).map_or(Ok(()), |table| table.write(members))?;
+        EventRow::of(outcome, &self.events, self.refined).try_for_each(|row| write(tables, &row))?;
+        RateRow::of(outcome).iter().try_for_each(|row| write(tables, row))?;
         self.torn = false;
         Ok(())
     }
 
     fn add_rows(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<()> {
-        if let Some(table) = &mut self.series {
-            series.iter().try_for_each(|row| table.row(row))?;
-        }
-        if let Some(table) = &mut self.snapshots {
-            snapshots.iter().try_for_each(|snapshot| table.snapshot(snapshot))?;
-        }
-        if let Some(store) = &mut self.store {
-            snapshots.iter().try_for_each(|snapshot| store.snapshot(snapshot))?;
-        }
-        Ok(())
+        series.iter().try_for_each(|row| write(&mut self.tables, row))?;
+        snapshots.iter().try_for_each(|snapshot| match &mut self.store {
+            Some(store) => store.snapshot(snapshot),
+            None => NodeRow::of(snapshot).try_for_each(|row| write(&mut self.tables, &row)),
+        })
     }
 
     /// Stores rows of a member that is still running; [`Growing::add`] reads them back.
@@ -182,43 +162,19 @@ impl Growing {
         self.spill.insert(spill).add(series, snapshots)
     }
 
-    /// Where the rows of the members are for now, and those of their events.
-    pub fn rows(&self) -> (&Place, Option<&Place>) {
-        (self.summary.part(), self.events.as_ref().map(|(own, ..)| own.part()))
-    }
-
-    /// Where the rows of the levels are for now, and those of the events there.
-    pub fn levels(&self) -> (&Place, Option<&Place>) {
-        (self.levels.part(), self.events.as_ref().map(|(_, levels, _)| levels.part()))
-    }
-
     /// Returns the extent of all files, once they are on disk.
     pub fn mark(&mut self) -> Result<(Vec<Mark>, Option<zarr::StoreMark>, Option<Mark>)> {
         if self.torn {
             return Err(Error::Failed("the rows of a member could not all be written".into()));
         }
-        let mut marks = vec![self.summary.mark()?, self.members.mark()?, self.levels.mark()?, self.rates.mark()?];
-        if let Some((own, levels, _)) = &mut self.events {
-            marks.extend([own.mark()?, levels.mark()?]);
-        }
-        marks.extend(self.series.as_mut().map(SeriesTable::mark).transpose()?);
-        marks.extend(self.snapshots.as_mut().map(SnapshotTable::mark).transpose()?);
+        let marks = self.tables.iter_mut().map(Table::mark).collect::<Result<_>>()?;
         let store = self.store.as_ref().map(SnapshotStore::mark).transpose()?;
         Ok((marks, store, self.spill.as_ref().map(Spill::mark).transpose()?))
     }
 
     /// Sets whether to keep them if the run fails.
     pub fn keep(&mut self, keep: bool) {
-        self.summary.keep(keep);
-        self.members.keep(keep);
-        self.levels.keep(keep);
-        self.rates.keep(keep);
-        if let Some((own, levels, _)) = &self.events {
-            own.keep(keep);
-            levels.keep(keep);
-        }
-        self.series.iter().for_each(|table| table.keep(keep));
-        self.snapshots.iter().for_each(|table| table.keep(keep));
+        self.tables.iter().for_each(|table| table.keep(keep));
         self.store.iter_mut().for_each(|store| store.keep(keep));
         self.spill.iter().for_each(|spill| spill.keep(keep));
     }
@@ -226,13 +182,16 @@ impl Growing {
     /// Completes all files on disk, ready for their final names; and returns the rows needed as long as there are
     /// checkpoints.
     pub fn ready(self) -> Result<(Vec<PartFile>, Option<PartFolder>, Option<Spill>)> {
-        let Growing { summary, members, levels, rates, events, series, snapshots, store, spill, .. } = self;
-        let mut files = vec![summary.ready()?, members.ready()?, levels.ready()?, rates.ready()?];
-        if let Some((own, levels, _)) = events {
-            files.extend([own.ready()?, levels.ready()?]);
-        }
-        files.extend(series.map(SeriesTable::ready).transpose()?);
-        files.extend(snapshots.map(SnapshotTable::ready).transpose()?);
-        Ok((files, store.map(SnapshotStore::ready).transpose()?, spill))
+        let files = self.tables.into_iter().map(Table::ready).collect::<Result<_>>()?;
+        Ok((files, self.store.map(SnapshotStore::ready).transpose()?, self.spill))
     }
+}
+
+fn find<'a>(tables: &'a mut [Table], name: &str) -> Option<&'a mut Table> {
+    tables.iter_mut().find(|table| table.name() == name)
+}
+
+/// Writes a row into its table, if that is asked for.
+fn write<R: TableRow>(tables: &mut [Table], row: &R) -> Result<()> {
+    find(tables, R::TABLE).map_or(Ok(()), |table| table.row(row))
 }

@@ -3,11 +3,11 @@
 
 use super::{
     column::{Field, known},
+    columns::of_growing,
     fields::Fields,
-    part_file::{Mark, PartFile},
+    names::MEMBERS,
     place::Place,
     table_reader::LineReader,
-    tables::Table,
 };
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Feature, Features, Outcome, Spec};
@@ -19,27 +19,29 @@ pub const OWN: [(&str, &str, &str); 3] = [
     ("label", "word", "name of its outline; empty if it has none"),
 ];
 
-/// The table, which grows row by row.
-pub struct MemberTable {
-    table: Table<Features>,
+/// The fields of its rows.
+pub struct MemberFields {
     spec: Spec,
     features: Vec<Feature>,
     /// The last cell, and the column of each of its features; some have none.
     places: Option<(u64, Vec<Option<usize>>)>,
 }
 
-impl MemberTable {
-    /// Begins the table of a run of `spec` with its header, or continues after the rows in `file`.
-    pub fn new(file: PartFile, spec: &Spec) -> Result<MemberTable> {
+impl MemberFields {
+    /// Those of a run of `spec`.
+    pub fn new(spec: &Spec) -> Result<MemberFields> {
         let features = spec.all_features()?;
-        let table = Table::with_header(file, header(&features))?;
         // Lists are not needed for features.
         let spec = Spec { only: None, snapshots: Vec::new(), ..spec.clone() };
-        Ok(MemberTable { table, spec, features, places: None })
+        Ok(MemberFields { spec, features, places: None })
     }
 
-    /// Writes the row of a member.
-    pub fn row(&mut self, outcome: &Outcome, Features(numbers): &Features) -> Result<()> {
+    /// The fields of a member.
+    pub(super) fn of<'a>(
+        &mut self,
+        outcome: &'a Outcome,
+        Features(numbers): &Features,
+    ) -> Result<impl Iterator<Item = Field<'a>>> {
         let Outcome { member, cell, ref label, .. } = *outcome;
         let places = self.places(cell)?;
         let mut row = vec![f64::NAN; self.features.len()];
@@ -52,7 +54,8 @@ impl MemberTable {
             false => Field::Float(known(value)),
         };
         let own = [Field::Whole(member), Field::Whole(cell), Field::Word(label)];
-        self.table.write(own.into_iter().chain(self.features.iter().zip(row).map(field)))
+        let fields: Vec<Field<'_>> = self.features.iter().zip(row).map(field).collect();
+        Ok(own.into_iter().chain(fields))
     }
 
     /// The column of each feature of a cell.
@@ -66,26 +69,6 @@ impl MemberTable {
             }
         }
     }
-
-    /// As [`Table::mark`].
-    pub fn mark(&mut self) -> Result<Mark> {
-        self.table.mark()
-    }
-
-    /// As [`Table::keep`].
-    pub fn keep(&self, keep: bool) {
-        self.table.keep(keep);
-    }
-
-    /// As [`Table::ready`].
-    pub fn ready(self) -> Result<PartFile> {
-        self.table.ready()
-    }
-}
-
-/// The headings.
-fn header(features: &[Feature]) -> impl Iterator<Item = &str> {
-    OWN.into_iter().map(|(name, ..)| name).chain(features.iter().map(|feature| &*feature.name))
 }
 
 /// The table of a run, read row by row.
@@ -102,7 +85,7 @@ impl MemberReader {
     /// truncated.
     pub fn open(place: &Place, spec: &Spec) -> Result<MemberReader> {
         let features = spec.all_features()?;
-        let names = header(&features).map(String::from).collect();
+        let names = of_growing(MEMBERS, spec)?.into_iter().map(|[name, ..]| name).collect();
         Ok(MemberReader { lines: LineReader::open(place, names)?, features })
     }
 

@@ -85,44 +85,11 @@ pub const ROWS: &str = "curvelax.rows";
 
 /// All files that a run may write, or that are made from one without naming a place; the one that vouches for the
 /// others comes first.
-pub fn own() -> impl Iterator<Item = &'static str> {
-    OWN.into_iter().chain(PARQUET).chain(PAPER)
+pub fn own() -> Vec<String> {
+    let own = [RUN, SHARD].into_iter().chain(TABLES).chain([PORTRAITS]).chain(PICTURES).chain([MOVIE, ROWS]);
+    let paper = PICTURES.into_iter().flat_map(|name| PAPER_EXTENSIONS.map(|extension| on_paper(name, extension)));
+    own.map(String::from).chain(parquet()).chain(paper.flatten()).collect()
 }
-
-const OWN: [&str; 32] = [
-    RUN,
-    SHARD,
-    SUMMARY,
-    MEMBERS,
-    LEVELS,
-    EVENTS,
-    EVENT_STATISTICS,
-    EVENT_LEVELS,
-    ENSEMBLE,
-    GROUPS,
-    EXPLAINED,
-    MEAN_EXCESS,
-    RATES,
-    SERIES,
-    SNAPSHOTS,
-    STORE,
-    PORTRAITS,
-    CURVES,
-    MEMBER_TIMES,
-    RELAXATION,
-    DISTRIBUTION,
-    RATE,
-    SURVIVAL,
-    GROUP_SURVIVAL,
-    EVENT_SURVIVAL,
-    EXCESS,
-    DEPENDENCE,
-    FEATURES,
-    MESH,
-    REPORT,
-    MOVIE,
-    ROWS,
-];
 
 /// The outlines that the Python package leaves with a run, and those of the earlier run until it is replaced.
 pub const PYTHON_OUTLINES: [&str; 2] = ["outlines.npz", "outlines.before"];
@@ -146,26 +113,14 @@ pub const TABLES: [&str; 14] = [
 ];
 
 /// The tables as Parquet, in the same order.
-pub const PARQUET: [&str; 13] = [
-    "summary.parquet",
-    "members.parquet",
-    "ensemble.parquet",
-    "groups.parquet",
-    "explained.parquet",
-    "events.parquet",
-    "event_statistics.parquet",
-    "rates.parquet",
-    "levels.parquet",
-    "event_levels.parquet",
-    "mean_excess.parquet",
-    "series.parquet",
-    "snapshots.parquet",
-];
+pub fn parquet() -> impl Iterator<Item = String> {
+    TABLES.into_iter().filter_map(as_parquet)
+}
 
 /// The name of the table `name` as Parquet; none for the store.
-pub fn as_parquet(name: &str) -> Option<&'static str> {
-    let place = TABLES.iter().position(|table| *table == name)?;
-    PARQUET.get(place).copied()
+pub fn as_parquet(name: &str) -> Option<String> {
+    let stem = name.strip_suffix(".csv").filter(|_| TABLES.contains(&name))?;
+    Some(format!("{stem}.parquet"))
 }
 
 /// The files that are drawn from the others.
@@ -185,38 +140,13 @@ pub const PICTURES: [&str; 13] = [
     CURVES,
 ];
 
-/// The same pictures for papers.
-const PAPER: [&str; 24] = [
-    "plots/members.png",
-    "plots/members.pdf",
-    "plots/relaxation.png",
-    "plots/relaxation.pdf",
-    "plots/distribution.png",
-    "plots/distribution.pdf",
-    "plots/survival.png",
-    "plots/survival.pdf",
-    "plots/groups.png",
-    "plots/groups.pdf",
-    "plots/events.png",
-    "plots/events.pdf",
-    "plots/excess.png",
-    "plots/excess.pdf",
-    "plots/rate.png",
-    "plots/rate.pdf",
-    "plots/dependence.png",
-    "plots/dependence.pdf",
-    "plots/features.png",
-    "plots/features.pdf",
-    "plots/mesh.png",
-    "plots/mesh.pdf",
-    "plots/curves.png",
-    "plots/curves.pdf",
-];
+/// The extensions of the same pictures for papers.
+const PAPER_EXTENSIONS: [&str; 2] = ["png", "pdf"];
 
 /// The name of the picture `name` for papers, with the extension `png` or `pdf`; none for the report.
-pub fn on_paper(name: &str, extension: &str) -> Option<&'static str> {
-    let stem = name.strip_suffix("svg")?;
-    PAPER.into_iter().find(|paper| paper.strip_prefix(stem) == Some(extension))
+pub fn on_paper(name: &str, extension: &str) -> Option<String> {
+    let stem = name.strip_suffix("svg").filter(|_| PAPER_EXTENSIONS.contains(&extension))?;
+    Some(format!("{stem}{extension}"))
 }
 
 /// The remedy for a file that was changed or truncated.
@@ -256,7 +186,7 @@ mod tests {
     #[test]
     fn every_table_has_the_same_name_as_parquet() {
         for name in TABLES.into_iter().filter(|name| *name != STORE) {
-            assert_eq!(as_parquet(name).map(str::to_owned), Some(name.replace(".csv", ".parquet")));
+            assert_eq!(as_parquet(name), Some(name.replace(".csv", ".parquet")));
         }
         assert_eq!([STORE, RUN].map(as_parquet), [None, None]);
     }
@@ -265,9 +195,8 @@ mod tests {
     fn every_picture_but_the_report_has_names_for_papers() {
         let pictures = || PICTURES.into_iter().filter(|name| *name != REPORT);
         for (name, extension) in pictures().flat_map(|name| ["png", "pdf"].map(|extension| (name, extension))) {
-            assert_eq!(on_paper(name, extension).map(str::to_owned), Some(name.replace("svg", extension)));
+            assert_eq!(on_paper(name, extension), Some(name.replace("svg", extension)));
         }
-        assert_eq!(PAPER.len(), 2 * pictures().count());
         assert_eq!([on_paper(REPORT, "png"), on_paper(MESH, "gif")], [None, None]);
     }
 }

@@ -55,12 +55,14 @@ impl Finished {
         let tally = tally(folder, &provenance)?;
         let films = films(folder)?;
         let excess = mean_excess(folder, &provenance)?;
-        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| Place::named(&folder.join(name)));
-        let spec = &provenance.spec;
-        let events = (!spec.event.is_empty()).then(|| Place::named(&folder.join(names::EVENTS)));
-        let explained = explained((&summary, events.as_ref()), &members, spec, tally.has_limits())?;
+        let explained = explained(&inside(folder), &provenance.spec, tally.has_limits())?;
         Ok(Finished { provenance, tally, excess, explained, films })
     }
+}
+
+/// The places of a finished run's files in its `folder`, by their names.
+fn inside(folder: &Path) -> impl Fn(&str) -> Place {
+    |name| Place::named(&folder.join(name))
 }
 
 /// Reads the portraits of the first members; none if the run could not save them.
@@ -142,14 +144,11 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
 /// Those of [`Finished::read`].
 pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let spec = &provenance.spec;
-    let place = |name: &str| Place::named(&folder.join(name));
-    let has_events = !spec.event.is_empty();
-    let of_events = has_events.then(|| place(names::EVENT_LEVELS));
-    let levels = levels((&place(names::LEVELS), of_events.as_ref()), spec)?;
+    let levels = levels(&inside(folder), spec)?;
     expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
     let mut tally = Tally::of(spec, &levels);
     (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
-    let mut rows = Summary::open(folder, spec, &levels)?;
+    let mut rows = Summary::open(&inside(folder), spec, &levels)?;
     rows.try_for_each(|outcome| tally.add(&outcome?))?;
     let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
     summary("rows", provenance.members, tally.members())?;
@@ -162,41 +161,38 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Reads the times at the levels of a run of `spec`: the place of its rows, and that of those of its events.
+/// Reads the times at the levels of a run of `spec`, whose tables have these places by their names.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of such a run.
-pub fn levels((place, of_events): (&Place, Option<&Place>), spec: &Spec) -> Result<LevelTimes> {
-    let (mut table, mut levels) = (TableReader::<LevelRow>::open(place)?, LevelTimes::default());
-    let mut events =
-        of_events.map(|of_events| EventTimes::<EventLevelRow>::open(of_events, place, spec)).transpose()?;
+pub fn levels(place: &dyn Fn(&str) -> Place, spec: &Spec) -> Result<LevelTimes> {
+    let (mut table, mut levels) = (TableReader::<LevelRow>::open(&place(names::LEVELS))?, LevelTimes::default());
+    let mut events = EventTimes::<EventLevelRow>::open(place, names::LEVELS, spec)?;
     while let Some((mut row, fields)) = table.read()? {
         let LevelRow { member, cell, .. } = row;
         if member >= spec.all_members() || cell != member / spec.members_per_cell() {
             let problem = format!("the cell of a member below {}", spec.all_members());
             return Err(fields.unexpected_in("cell", &problem));
         }
-        if let Some(events) = &mut events {
-            row.events = events.next((member, row.level), |_| true)?.iter().map(EventTime::time).collect();
-        }
+        row.events = events.next((member, row.level), |_| true)?.iter().map(EventTime::time).collect();
         levels.add(&row).map_err(|expected| fields.unexpected_in("level", &expected))?;
     }
-    events.as_mut().map_or(Ok(()), EventTimes::end)?;
+    events.end()?;
     Ok(levels)
 }
 
-/// Adds up the rows of a resumed run, and those of its events, with those of its levels, and `supplement`.
+/// Adds up the rows of a resumed run, whose tables have these places, with those of its levels, and `supplement`.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of a run of `spec`.
 pub fn rows(
-    place: (&Place, Option<&Place>),
+    place: &dyn Fn(&str) -> Place,
     spec: &Spec,
     levels: &LevelTimes,
     supplement: TallySupplement,
 ) -> Result<Tally> {
     let mut tally = Tally::of(spec, levels);
-    let mut rows = Summary::of(place, spec, levels)?;
+    let mut rows = Summary::open(place, spec, levels)?;
     rows.try_for_each(|outcome| tally.add(&outcome?))?;
     rows.end()?;
     tally.set_supplement(supplement);
@@ -217,7 +213,7 @@ pub struct Summary<'a> {
     levels: &'a LevelTimes,
     table: TableReader<Outcome>,
     /// Those of their events.
-    events: Option<EventTimes<EventRow>>,
+    events: EventTimes<EventRow>,
     last: Option<u64>,
     spec: Spec,
     /// The last cell and its spec.
@@ -225,24 +221,19 @@ pub struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    /// Opens the table in `folder`, of a run of `spec`.
+    /// Opens the table of a run of `spec`, whose tables have these places.
     ///
     /// # Errors
     /// [`Error::Request`] if it does not exist, has other columns, or is truncated.
-    pub fn open(folder: &Path, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
-        let place = |name: &str| Place::named(&folder.join(name));
-        let events = (!spec.event.is_empty()).then(|| place(names::EVENTS));
-        Summary::of((&place(names::SUMMARY), events.as_ref()), spec, levels)
-    }
-
-    fn of((place, events): (&Place, Option<&Place>), spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
-        let events = events.map(|events| EventTimes::open(events, place, spec)).transpose()?;
-        Ok(Summary { levels, table: TableReader::open(place)?, events, last: None, spec: spec.clone(), spec_of: None })
+    pub fn open(place: &dyn Fn(&str) -> Place, spec: &Spec, levels: &'a LevelTimes) -> Result<Summary<'a>> {
+        let events = EventTimes::open(place, names::SUMMARY, spec)?;
+        let table = TableReader::open(&place(names::SUMMARY))?;
+        Ok(Summary { levels, table, events, last: None, spec: spec.clone(), spec_of: None })
     }
 
     /// Checks that there are no events of further members.
     fn end(mut self) -> Result<()> {
-        self.events.as_mut().map_or(Ok(()), EventTimes::end)
+        self.events.end()
     }
 
     fn read(&mut self) -> Result<Option<Outcome>> {
@@ -267,14 +258,11 @@ impl<'a> Summary<'a> {
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
-        let mut limits = Vec::new();
-        if let Some(events) = &mut self.events {
-            let end = outcome.t_end;
-            let fits = |row: &EventRow| if row.censored == 0 { row.t <= end } else { row.t == end };
-            let rows = events.next((member, 0), fits)?;
-            outcome.events = rows.iter().map(EventTime::time).collect();
-            limits = rows.iter().map(|row| row.t_limit.zip(row.t_error)).collect();
-        }
+        let end = outcome.t_end;
+        let fits = |row: &EventRow| if row.censored == 0 { row.t <= end } else { row.t == end };
+        let rows = self.events.next((member, 0), fits)?;
+        outcome.events = rows.iter().map(EventTime::time).collect();
+        let limits = rows.iter().map(|row| row.t_limit.zip(row.t_error));
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
         outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
             let values = spec.values_of(member, cell).ok()?;
@@ -299,12 +287,11 @@ impl<'a> Summary<'a> {
         }
         let refined = self.spec.refine;
         let judged = |place| outcome.limit_of_event(place).filter(|_| refined).map(|limit| (limit.t, limit.error));
-        let mut pairs = limits.into_iter().enumerate().map(|(place, told)| (place, told, judged(place)));
-        if let (Some(events), Some((place, told, found))) = (&self.events, pairs.find(|(_, told, found)| told != found))
-        {
+        let mut pairs = limits.enumerate().map(|(place, told)| (place, told, judged(place)));
+        if let Some((place, told, found)) = pairs.find(|(_, told, found)| told != found) {
             let shown =
                 |limit: Option<(f64, f64)>| limit.map_or("nothing".into(), |(t, error)| format!("{t} ± {error}"));
-            let (path, name, file) = (events.path.display(), &events.names[place], names::EVENT_LEVELS);
+            let (path, name, file) = (self.events.path.display(), &self.events.names[place], names::EVENT_LEVELS);
             return Err(Error::Request(format!(
                 "{path}: expected the limit {} of the event {name} of member {member}, as {file} has it, found {}; {REMEDY}",
                 shown(found),
@@ -356,7 +343,7 @@ impl EventTime for EventLevelRow {
     }
 }
 
-/// A table of events, read along with that of the members.
+/// A table of events, read along with that of the members or levels. Without events there is none, and nothing is read.
 struct EventTimes<R> {
     path: PathBuf,
     /// The table of the members.
@@ -365,16 +352,17 @@ struct EventTimes<R> {
     last: Option<(u64, u64)>,
     /// The number of members of the study.
     members: u64,
-    table: TableReader<R>,
+    table: Option<TableReader<R>>,
     names: Vec<String>,
 }
 
 impl<R: EventTime> EventTimes<R> {
-    fn open(place: &Place, beside: &Place, spec: &Spec) -> Result<EventTimes<R>> {
-        let names = spec.event.iter().map(|event| event.name.clone()).collect();
-        let [path, beside] = [place, beside].map(|place| place.shown().to_path_buf());
-        let (table, members) = (TableReader::open(place)?, spec.all_members());
-        Ok(EventTimes { path, beside, last: None, members, table, names })
+    fn open(place: &dyn Fn(&str) -> Place, beside: &str, spec: &Spec) -> Result<EventTimes<R>> {
+        let names: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
+        let [own, beside] = [R::TABLE, beside].map(place);
+        let table = (!names.is_empty()).then(|| TableReader::open(&own)).transpose()?;
+        let [path, beside] = [own, beside].map(|place| place.shown().to_path_buf());
+        Ok(EventTimes { path, beside, last: None, members: spec.all_members(), table, names })
     }
 
     /// The error for a row of `of`, which is not due yet, if it is one that the table of the members lacks and has
@@ -391,8 +379,9 @@ impl<R: EventTime> EventTimes<R> {
     /// The rows of the events of the next member, which must be that of `place` and of which all must `fit`.
     fn next(&mut self, place: (u64, u64), fits: impl Fn(&R) -> bool) -> Result<Vec<R>> {
         let mut rows = Vec::with_capacity(self.names.len());
+        let Some(table) = &mut self.table else { return Ok(rows) };
         for name in &self.names {
-            let Some((row, fields)) = self.table.read()? else {
+            let Some((row, fields)) = table.read()? else {
                 let (path, member) = (self.path.display(), place.0);
                 let problem = format!("expected the events of member {member}, found the end of the file");
                 return Err(Error::Request(format!("{path}: {problem}; {REMEDY}")));
@@ -420,7 +409,7 @@ impl<R: EventTime> EventTimes<R> {
 
     /// Checks that there are no more rows.
     fn end(&mut self) -> Result<()> {
-        match self.table.read()? {
+        match self.table.as_mut().map_or(Ok(None), TableReader::read)? {
             None => Ok(()),
             Some((row, fields)) => {
                 let wrong = fields.unexpected_in("member", "the end of the file");
@@ -440,18 +429,16 @@ impl Iterator for Summary<'_> {
 }
 
 /// Finds what explains the times in a `summary.csv`, and those of its events, by the features in a `members.csv`, of a
-/// run of `spec`; with limits first, if there are any. All are read as far as members enter.
+/// run of `spec` whose tables have these places; with limits first, if there are any. All are read as far as members
+/// enter.
 ///
 /// # Errors
 /// [`Error::Request`] for rows that are not of the same members, each once.
-pub fn explained(
-    (summary, events): (&Place, Option<&Place>),
-    members: &Place,
-    spec: &Spec,
-    of_limits: bool,
-) -> Result<Explained> {
-    let (mut outcomes, mut table) = (TableReader::<Outcome>::open(summary)?, MemberReader::open(members, spec)?);
-    let mut events = events.map(|place| EventTimes::<EventRow>::open(place, summary, spec)).transpose()?;
+pub fn explained(place: &dyn Fn(&str) -> Place, spec: &Spec, of_limits: bool) -> Result<Explained> {
+    let members = place(names::MEMBERS);
+    let mut outcomes = TableReader::<Outcome>::open(&place(names::SUMMARY))?;
+    let (mut table, mut events) =
+        (MemberReader::open(&members, spec)?, EventTimes::<EventRow>::open(place, names::SUMMARY, spec)?);
     let count = table.features().len();
     let names = spec.event.iter().map(|event| event.name.clone());
     let times = of_limits.then_some("t_limit").into_iter().chain(TIMES).map(String::from);
@@ -466,10 +453,7 @@ pub fn explained(
                 return Err(fields.unexpected_in(name, &format!("{told}, as in {}", names::SUMMARY)));
             }
         }
-        let of_events = match &mut events {
-            Some(events) => events.next((member, 0), |_| true)?,
-            None => Vec::new(),
-        };
+        let of_events = events.next((member, 0), |_| true)?;
         if explaining.wants(cell) {
             // An event has its limit where there is one, as everywhere.
             let of_events = of_events.iter().map(|row| row.t_limit.or(row.time()));
@@ -496,7 +480,7 @@ pub fn explained(
 /// # Errors
 /// Those of [`Finished::read`].
 pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExcess>> {
-    let mut table = TableReader::<MeanExcess>::open(&Place::named(&folder.join(names::MEAN_EXCESS)))?;
+    let mut table = TableReader::<MeanExcess>::open(&inside(folder)(names::MEAN_EXCESS))?;
     let (mut rows, mut count, mut last): (Vec<MeanExcess>, u64, _) = (Vec::new(), 0, None);
     while let Some((row, fields)) = table.read()? {
         let at = (row.cell, row.t);
@@ -515,7 +499,7 @@ pub fn mean_excess(folder: &Path, provenance: &Provenance) -> Result<Vec<MeanExc
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{OutputFolder, tables::SummaryTable};
+    use crate::{OutputFolder, tables::Table};
     use curvelax_ensemble::{Observables, Status};
     use curvelax_study::samples::outcome;
 
@@ -552,14 +536,14 @@ mod tests {
             turning: -1,
         };
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SummaryTable::new(folder.file(names::SUMMARY).unwrap()).unwrap();
+        let mut table = Table::new::<Outcome>(folder.file(names::SUMMARY).unwrap()).unwrap();
         table.row(&written).unwrap();
         folder.publish_all(vec![table.ready().unwrap()]).unwrap();
         let mut spec = Spec { curves: 2, ..Spec::default() };
         spec.sweep.set("omega=1,2".parse().unwrap());
         written.rate_theory = spec.rate_in_theory(&spec.typical(), [-6.5, f64::NAN]);
         let read: Vec<Outcome> =
-            Summary::open(home.path(), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
+            Summary::open(&inside(home.path()), &spec, &LevelTimes::default()).unwrap().map(Result::unwrap).collect();
         assert_eq!(read, [written.clone()]);
         assert_eq!(read[0].end.excess.to_bits(), written.end.excess.to_bits());
     }

@@ -5,14 +5,12 @@
 //! A column is a line of `columns!`. [`Table::row`] writes its field and [`TableReader`](super::TableReader) reads it;
 //! how is in `column.rs`, by kind.
 
-use std::marker::PhantomData;
-
 use csv::{Writer, WriterBuilder};
 
 use super::{
-    column::{Field, TableRow, columns},
+    column::{Field, TableRow, columns, row},
+    names,
     part_file::{Mark, PartFile},
-    place::Place,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelRow, Outcome, SeriesRow, Snapshot};
@@ -21,7 +19,7 @@ use curvelax_study::results::{explained::ExplainedRow, tally::MeanExcess};
 /// Bytes gathered before they are written.
 const BUFFER: usize = 1 << 16;
 
-columns! { Outcome:
+columns! { Outcome, names::SUMMARY:
     member: whole = member, "index of the member, from 0";
     cell: whole = cell, "index of its cell, from 0";
     status: status = status, "how the member ended";
@@ -63,7 +61,7 @@ columns! { Outcome:
     t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit; of an outline with what rounding does, as in t_error";
 }
 
-columns! { LevelRow:
+columns! { LevelRow, names::LEVELS:
     member: whole = member, "index of the member";
     level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes; of outlines 100 more, on its finest one: with every second point, and 200 more: with corners rounded to twice the radius";
     cell: whole = cell, "index of its cell";
@@ -79,79 +77,40 @@ columns! { LevelRow:
     length_start: number = length_start, "as in `summary.csv`, at these nodes";
 }
 
-/// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct RateRow {
-    member: u64,
-    cell: u64,
-    rate: Option<f64>,
-    rate_r2: Option<f64>,
-    rate_theory: Option<f64>,
-    rate_ratio: Option<f64>,
+row! {
+    /// A row of `rates.csv`: the fitted rate of a member, and that of linear theory.
+    RateRow, names::RATES:
+    member: whole, "index of the member";
+    cell: whole, "index of its cell";
+    rate: optional, "as in `summary.csv`";
+    rate_r2: optional, "as in `summary.csv`";
+    rate_theory: optional, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion, for elastic flow at the radius while the rate is fitted; empty where there is none";
+    rate_ratio: optional, "rate / rate_theory";
 }
 
-columns! { RateRow:
-    member: whole = member, "index of the member";
-    cell: whole = cell, "index of its cell";
-    rate: optional = rate, "as in `summary.csv`";
-    rate_r2: optional = rate_r2, "as in `summary.csv`";
-    rate_theory: optional = rate_theory, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion, for elastic flow at the radius while the rate is fitted; empty where there is none";
-    rate_ratio: optional = rate_ratio, "rate / rate_theory";
+row! {
+    /// A row of `events.csv`: the time of an event of a member, or until when it was not seen.
+    EventRow, names::EVENTS:
+    member: whole, "index of the member";
+    cell: whole, "index of its cell";
+    event: word, "name of the event";
+    t: time, "first time at which its condition holds, found inside the step; of a censored one, when the member ended";
+    censored: whole, "0: it happened at t; 1: it had not happened by then";
+    t_limit: event, "with `--refine`: t in the limit of many nodes and short steps";
+    t_error: event, "half-width of the 95 % interval of t_limit";
 }
 
-/// A row of `events.csv`: the time of an event of a member, or until when it was not seen.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EventRow {
-    /// Index of the member.
-    pub member: u64,
-    /// Index of its cell.
-    pub cell: u64,
-    /// Name of the event.
-    pub event: String,
-    /// When it happened, or when the member ended.
-    pub t: f64,
-    /// 1 if it had not happened by then.
-    pub censored: u64,
-    /// Its limit, with `--refine`.
-    pub t_limit: Option<f64>,
-    /// Half-width of the 95 % interval of that.
-    pub t_error: Option<f64>,
+row! {
+    /// A row of `event_levels.csv`: the time of an event of a member at a level.
+    EventLevelRow, names::EVENT_LEVELS:
+    member: whole, "index of the member";
+    level: whole, "as in `levels.csv`";
+    cell: whole, "index of its cell";
+    event: word, "name of the event";
+    t: event, "first time at which its condition holds; empty if it was not seen";
 }
 
-columns! { EventRow:
-    member: whole = member, "index of the member";
-    cell: whole = cell, "index of its cell";
-    event: word = event, "name of the event";
-    t: time = t, "first time at which its condition holds, found inside the step; of a censored one, when the member ended";
-    censored: whole = censored, "0: it happened at t; 1: it had not happened by then";
-    t_limit: event = t_limit, "with `--refine`: t in the limit of many nodes and short steps";
-    t_error: event = t_error, "half-width of the 95 % interval of t_limit";
-}
-
-/// A row of `event_levels.csv`: the time of an event of a member at a level.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct EventLevelRow {
-    /// Index of the member.
-    pub member: u64,
-    /// Number of the level.
-    pub level: u64,
-    /// Index of the cell.
-    pub cell: u64,
-    /// Name of the event.
-    pub event: String,
-    /// When it happened.
-    pub t: Option<f64>,
-}
-
-columns! { EventLevelRow:
-    member: whole = member, "index of the member";
-    level: whole = level, "as in `levels.csv`";
-    cell: whole = cell, "index of its cell";
-    event: word = event, "name of the event";
-    t: event = t, "first time at which its condition holds; empty if it was not seen";
-}
-
-columns! { SeriesRow:
+columns! { SeriesRow, names::SERIES:
     member: whole = member, "index of the member";
     t: time = t, "time";
     length: number = at.length, "length of the polygon";
@@ -164,29 +123,19 @@ columns! { SeriesRow:
     metric_drift: number = at.metric_drift, "max |r_i - |e_i||/|e_i|";
 }
 
-/// A row of `snapshots.csv`: a node of a member at a time.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct NodeRow {
-    member: u64,
-    t: f64,
-    i: u64,
-    x: f64,
-    y: f64,
-    k: f64,
-    r: f64,
+row! {
+    /// A row of `snapshots.csv`: a node of a member at a time.
+    NodeRow, names::SNAPSHOTS:
+    member: whole, "index of the member";
+    t: time, "time";
+    i: whole, "node, from 1 to n";
+    x: number, "x coordinate of the node";
+    y: number, "y coordinate of the node";
+    k: number, "signed curvature of the segment that ends at the node";
+    r: number, "length of the segment that ends at the node, as the scheme evolves it";
 }
 
-columns! { NodeRow:
-    member: whole = member, "index of the member";
-    t: time = t, "time";
-    i: whole = i, "node, from 1 to n";
-    x: number = x, "x coordinate of the node";
-    y: number = y, "y coordinate of the node";
-    k: number = k, "signed curvature of the segment that ends at the node";
-    r: number = r, "length of the segment that ends at the node, as the scheme evolves it";
-}
-
-columns! { MeanExcess:
+columns! { MeanExcess, names::MEAN_EXCESS:
     cell: whole = cell, "index of the cell";
     t: time = t, "time, one of 33 that are dense at the start";
     members: whole = members, "members of the cell that reached t";
@@ -197,7 +146,7 @@ columns! { MeanExcess:
     q95: optional = q95, "its 95 % quantile, to 1 %";
 }
 
-columns! { ExplainedRow:
+columns! { ExplainedRow, names::EXPLAINED:
     cell: whole = cell, "index of the cell";
     time: word = time, "what is explained: t_limit with `--refine`, t_relax, t_half, or the name of an event";
     feature: word = feature, "a column of `members.csv`, best first; or together: a regression on the chosen ones";
@@ -210,33 +159,22 @@ columns! { ExplainedRow:
 }
 
 /// A table that grows row by row.
-pub struct Table<R> {
+pub struct Table {
     // Flushes when dropped.
     writer: Writer<PartFile>,
-    kind: PhantomData<fn(R)>,
 }
 
-/// `summary.csv`: one row per member.
-pub type SummaryTable = Table<Outcome>;
-/// `levels.csv`: one row per member and level.
-pub type LevelTable = Table<LevelRow>;
-/// `event_levels.csv`: the events of each member at each level.
-pub type EventLevelTable = Table<EventLevelRow>;
-/// `events.csv`: the events of each member.
-pub type EventTable = Table<EventRow>;
-/// `rates.csv`: the fitted rate of each member that has one.
-pub type RateTable = Table<RateRow>;
-/// `series.csv`: the observables of each member over time.
-pub type SeriesTable = Table<SeriesRow>;
-/// `snapshots.csv`: the nodes of each member at given times.
-pub type SnapshotTable = Table<NodeRow>;
+impl Table {
+    /// Begins a table of such rows, or continues after those in `file`.
+    pub fn new<R: TableRow>(file: PartFile) -> Result<Table> {
+        Table::with_header(file, R::COLUMNS.iter().map(|column| column.name))
+    }
 
-impl<R> Table<R> {
     /// Begins a table with these headings, or continues after the rows in `file`.
-    pub(super) fn with_header<'a>(file: PartFile, names: impl Iterator<Item = &'a str>) -> Result<Self> {
+    pub(super) fn with_header<'a>(file: PartFile, names: impl Iterator<Item = &'a str>) -> Result<Table> {
         let begins = file.is_empty();
         let writer = WriterBuilder::new().has_headers(false).buffer_capacity(BUFFER).from_writer(file);
-        let mut table = Table { writer, kind: PhantomData };
+        let mut table = Table { writer };
         if begins {
             table.write(names.map(Field::Word))?;
         }
@@ -254,9 +192,9 @@ impl<R> Table<R> {
         self.writer.get_ref().keep(keep);
     }
 
-    /// The place of its rows, under a temporary name.
-    pub fn part(&self) -> &Place {
-        self.writer.get_ref().part()
+    /// Its name in its folder.
+    pub(super) fn name(&self) -> &str {
+        self.writer.get_ref().name()
     }
 
     /// Completes the table on disk, ready for its final name.
@@ -272,22 +210,15 @@ impl<R> Table<R> {
         let row: Vec<Field<'_>> = fields.collect();
         self.writer.serialize(row).map_err(|e| Error::io("cannot write", self.writer.get_ref().target())(e.into()))
     }
-}
-
-impl<R: TableRow> Table<R> {
-    /// Begins a table with its header, or continues after the rows in `file`.
-    pub fn new(file: PartFile) -> Result<Self> {
-        Table::with_header(file, R::COLUMNS.iter().map(|column| column.name))
-    }
 
     /// Writes a row.
-    pub fn row(&mut self, record: &R) -> Result<()> {
+    pub fn row<R: TableRow>(&mut self, record: &R) -> Result<()> {
         self.write(R::COLUMNS.iter().map(|column| (column.write)(record)))
     }
 
     /// Writes a whole table into `file`, ready for its final name.
-    pub fn of(file: PartFile, rows: &[R]) -> Result<PartFile> {
-        let mut table = Table::new(file)?;
+    pub fn of<R: TableRow>(file: PartFile, rows: &[R]) -> Result<PartFile> {
+        let mut table = Table::new::<R>(file)?;
         rows.iter().try_for_each(|row| table.row(row))?;
         table.ready()
     }
@@ -336,15 +267,11 @@ impl EventLevelRow {
     }
 }
 
-impl SnapshotTable {
-    /// Writes one row per node, i = 1…n.
-    pub fn snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
-        let Snapshot { member, t, x, y, k, r } = snapshot;
+impl NodeRow {
+    /// The rows of a snapshot, i = 1…n.
+    pub fn of(Snapshot { member, t, x, y, k, r }: &Snapshot) -> impl Iterator<Item = NodeRow> {
         let nodes = x.iter().zip(y).zip(k).zip(r);
-        for (i, (((x, y), k), r)) in (1_u64..).zip(nodes) {
-            self.row(&NodeRow { member: *member, t: *t, i, x: *x, y: *y, k: *k, r: *r })?;
-        }
-        Ok(())
+        (1..).zip(nodes).map(|(i, (((x, y), k), r))| NodeRow { member: *member, t: *t, i, x: *x, y: *y, k: *k, r: *r })
     }
 }
 
@@ -402,7 +329,7 @@ pub(crate) mod tests {
 
     fn summary(rows: &[Outcome]) -> String {
         written("summary.csv", |file| {
-            let mut table = SummaryTable::new(file)?;
+            let mut table = Table::new::<Outcome>(file)?;
             rows.iter().try_for_each(|row| table.row(row))?;
             table.ready()
         })
@@ -446,7 +373,7 @@ pub(crate) mod tests {
     #[test]
     fn rates_and_mean_excess_have_these_bytes() {
         let text = written("rates.csv", |file| {
-            let mut table = RateTable::new(file)?;
+            let mut table = Table::new::<RateRow>(file)?;
             let at = Observables::default();
             for rate_theory in [None, Some(6.0)] {
                 let member = Outcome { rate: Some(6.0), rate_r2: Some(0.5), rate_theory, ..outcome(at, at) };
@@ -469,7 +396,7 @@ pub(crate) mod tests {
     #[test]
     fn series_and_snapshots_have_these_bytes() {
         let text = written("series.csv", |file| {
-            let mut table = SeriesTable::new(file)?;
+            let mut table = Table::new::<SeriesRow>(file)?;
             table.row(&SeriesRow { member: 1, t: 0.01, at: Observables { k_max: f64::NAN, ..observables() } })?;
             table.ready()
         });
@@ -479,9 +406,10 @@ pub(crate) mod tests {
              1,0.01,9.688448220547675,6.5,1e-300,-0.0,2.781342323134e-309,,1.0,0.3333333333333333\n"
         );
         let text = written("snapshots.csv", |file| {
-            let mut table = SnapshotTable::new(file)?;
+            let mut table = Table::new::<NodeRow>(file)?;
             let (x, y) = (vec![1.0, 2.0], vec![3.0, 4.0]);
-            table.snapshot(&Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] })?;
+            let snapshot = Snapshot { member: 1, t: 0.25, x, y, k: vec![5.0, 6.0], r: vec![7.0, 8.0] };
+            NodeRow::of(&snapshot).try_for_each(|row| table.row(&row))?;
             table.ready()
         });
         assert_eq!(text, "member,t,i,x,y,k,r\n1,0.25,1,1.0,3.0,5.0,7.0\n1,0.25,2,2.0,4.0,6.0,8.0\n");
@@ -519,8 +447,8 @@ pub(crate) mod tests {
         let text = |name: &str| fs::read_to_string(home.path().join(name)).unwrap();
         let one = outcome(observables(), observables());
         let folder = OutputFolder::open(home.path(), true).unwrap();
-        let mut table = SummaryTable::new(folder.file("summary.csv").unwrap()).unwrap();
-        let lone = SeriesTable::new(folder.file("series.csv").unwrap()).unwrap();
+        let mut table = Table::new::<Outcome>(folder.file("summary.csv").unwrap()).unwrap();
+        let lone = Table::new::<SeriesRow>(folder.file("series.csv").unwrap()).unwrap();
         table.row(&one).unwrap();
         let mark = table.mark().unwrap();
         table.row(&Outcome { member: 4, ..one.clone() }).unwrap();
@@ -530,7 +458,7 @@ pub(crate) mod tests {
         assert_eq!(text(".summary.csv.part").lines().count(), 3);
 
         folder.check(&mark).unwrap();
-        let mut again = SummaryTable::new(folder.file_again(&mark).unwrap()).unwrap();
+        let mut again = Table::new::<Outcome>(folder.file_again(&mark).unwrap()).unwrap();
         again.row(&Outcome { member: 5, ..one.clone() }).unwrap();
         let straight = summary(&[one.clone(), Outcome { member: 5, ..one }]);
         let mark = again.mark().unwrap();

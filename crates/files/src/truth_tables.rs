@@ -1,80 +1,46 @@
 //! The tables of `curvelax convergence`: errors against exact solutions and the referee, and what they cost.
 
-use super::column::columns;
+use super::{column::row, names};
 use curvelax_study::truth::{ConvergenceRow, RefereeRow, WorkRow};
 
-/// A row of `convergence.csv`: the error of a run against an exact solution.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ErrorRow {
-    problem: String,
-    varied: String,
-    n: u64,
-    tau: Option<f64>,
-    tolerance: Option<f64>,
-    error: Option<f64>,
-    order: Option<f64>,
+row! {
+    /// A row of `convergence.csv`: the error of a run against an exact solution.
+    ErrorRow, names::CONVERGENCE:
+    problem: word, "name of the problem";
+    varied: word, "what is refined: n, tau or tolerance";
+    n: whole, "nodes";
+    tau: optional, "time step; empty where steps adapt";
+    tolerance: optional, "local error tolerance of adaptive steps";
+    error: optional, "measured / exact - 1; empty where the run ended early";
+    order: optional, "observed order against the row before";
 }
 
-columns! { ErrorRow:
-    problem: word = problem, "name of the problem";
-    varied: word = varied, "what is refined: n, tau or tolerance";
-    n: whole = n, "nodes";
-    tau: optional = tau, "time step; empty where steps adapt";
-    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
-    error: optional = error, "measured / exact - 1; empty where the run ended early";
-    order: optional = order, "observed order against the row before";
+row! {
+    /// A row of `referee.csv`: a relaxation time of a member, and that of an independent solver.
+    TruthRow, names::REFEREE:
+    member: whole, "index of the member";
+    time: word, "which time of `summary.csv` it is: t_relax or t_limit";
+    points: whole, "nodes";
+    t: event, "the time; empty if the member did not relax";
+    t_error: optional, "half-width of the 95 % interval of t_limit";
+    order: optional, "of t_relax: order of the error against the row before; of t_limit: as in `summary.csv`";
+    referee: event, "the time by the referee; empty if it refused the curve";
+    referee_error: optional, "its uncertainty: the difference from a solution with half the nodes and a wider tolerance";
+    error: optional, "t / referee - 1";
+    bars: optional, "(t - referee) / t_error";
 }
 
-/// A row of `referee.csv`: a relaxation time of a member, and that of an independent solver.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TruthRow {
-    member: u64,
-    time: String,
-    points: u64,
-    t: Option<f64>,
-    t_error: Option<f64>,
-    order: Option<f64>,
-    referee: Option<f64>,
-    referee_error: Option<f64>,
-    error: Option<f64>,
-    bars: Option<f64>,
-}
-
-columns! { TruthRow:
-    member: whole = member, "index of the member";
-    time: word = time, "which time of `summary.csv` it is: t_relax or t_limit";
-    points: whole = points, "nodes";
-    t: event = t, "the time; empty if the member did not relax";
-    t_error: optional = t_error, "half-width of the 95 % interval of t_limit";
-    order: optional = order, "of t_relax: order of the error against the row before; of t_limit: as in `summary.csv`";
-    referee: event = referee, "the time by the referee; empty if it refused the curve";
-    referee_error: optional = referee_error, "its uncertainty: the difference from a solution with half the nodes and a wider tolerance";
-    error: optional = error, "t / referee - 1";
-    bars: optional = bars, "(t - referee) / t_error";
-}
-
-/// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CostRow {
-    solver: String,
-    tau: Option<f64>,
-    tolerance: Option<f64>,
-    most_order: u64,
-    error: Option<f64>,
-    solves: f64,
-    sweeps: f64,
-    seconds: f64,
-}
-
-columns! { CostRow:
-    solver: word = solver, "solver of the systems";
-    tau: optional = tau, "time step; empty where steps adapt";
-    tolerance: optional = tolerance, "local error tolerance of adaptive steps";
-    most_order: whole = most_order, "highest order of the steps; 1 for fixed ones";
-    error: optional = error, "median of |t_relax / reference - 1|; empty unless all members relaxed";
-    solves: number = solves, "steps of the paper per member, mean";
-    sweeps: number = sweeps, "sweeps per member, mean";
-    seconds: number = seconds, "seconds per member with all threads at work, median of several runs";
+row! {
+    /// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
+    CostRow, names::WORK:
+    solver: word, "solver of the systems";
+    tau: optional, "time step; empty where steps adapt";
+    tolerance: optional, "local error tolerance of adaptive steps";
+    most_order: whole, "highest order of the steps; 1 for fixed ones";
+    error: optional, "median of |t_relax / reference - 1|; empty unless all members relaxed";
+    solves: number, "steps of the paper per member, mean";
+    sweeps: number, "sweeps per member, mean";
+    seconds: number, "seconds per member with all threads at work, median of several runs";
 }
 
 impl ErrorRow {

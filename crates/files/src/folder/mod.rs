@@ -49,7 +49,7 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Opens the folder of a run, as [`OutputFolder::open_for`].
     pub fn open(path: &Path, existing: impl Into<Existing>) -> Result<OutputFolder> {
-        OutputFolder::open_for(path, existing, Owner::Run, own().map(String::from).collect())
+        OutputFolder::open_for(path, existing, Owner::Run, own())
     }
 
     /// Checks that [`OutputFolder::open`] may succeed, and touches nothing.
@@ -57,7 +57,7 @@ impl OutputFolder {
     /// # Errors
     /// Those of [`OutputFolder::open`] that can be told from outside.
     pub fn check_place(path: &Path, existing: impl Into<Existing>) -> Result<()> {
-        check_place(path, existing.into(), Owner::Run, &own().map(String::from).collect::<Vec<_>>())
+        check_place(path, existing.into(), Owner::Run, &own())
     }
 
     /// Creates the folder and its parents, for `owner` to write the files `names` into. An existing folder is refused
@@ -175,8 +175,8 @@ impl OutputFolder {
         self.place.join(name)
     }
 
-    /// The temporary name of `name`.
-    fn part(&self, name: &str) -> Place {
+    /// The place of `name` in it while it grows, under its temporary name.
+    pub fn part(&self, name: &str) -> Place {
         self.place.join(part(Path::new(name)))
     }
 }

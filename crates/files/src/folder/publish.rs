@@ -62,8 +62,9 @@ impl OutputFolder {
         self.remove_own(RUN)?;
         files.into_iter().try_for_each(PartFile::finish)?;
         store.map_or(Ok(()), PartFolder::finish)?;
-        let mut earlier = own().filter(|name| !written.iter().any(|own| own == name));
-        earlier.try_for_each(|name| self.remove_own(name))?;
+        for name in own().into_iter().filter(|name| !written.contains(name)) {
+            self.remove_own(&name)?;
+        }
         run.finish()?;
         self.check_claim()
     }

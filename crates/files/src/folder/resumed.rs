@@ -45,7 +45,7 @@ impl OutputFolder {
             };
             return Err(refuse(format!("no run was started here; {remedy}")));
         }
-        let mut folder = OutputFolder::of(path, own().map(String::from).collect());
+        let mut folder = OutputFolder::of(path, own());
         if !folder.claim().map_err(cannot)? {
             return Err(refuse("a run is writing here; wait until it ends".into()));
         }

@@ -5,7 +5,10 @@ use std::{fs, path::Path};
 use serde_json::Value;
 
 use super::SnapshotStore;
-use crate::{OutputFolder, names, tables::SnapshotTable};
+use crate::{
+    OutputFolder, names,
+    tables::{NodeRow, Table},
+};
 use curvelax_backend::{Backend, cpu::CpuBackend};
 use curvelax_ensemble::{
     Cell, Ended, Family, Snapshot, Spec, Status,
@@ -214,8 +217,9 @@ fn a_run_leaves_the_same_bits_as_in_its_table() {
 
     let elsewhere = tempfile::tempdir().unwrap();
     let out = OutputFolder::open(elsewhere.path(), true).unwrap();
-    let mut table = SnapshotTable::new(out.file("snapshots.csv").unwrap()).unwrap();
-    members.iter().flat_map(|(_, snapshots)| snapshots).for_each(|own| table.snapshot(own).unwrap());
+    let mut table = Table::new::<NodeRow>(out.file("snapshots.csv").unwrap()).unwrap();
+    let rows_of = |own: &Snapshot| NodeRow::of(own).try_for_each(|row| table.row(&row)).unwrap();
+    members.iter().flat_map(|(_, snapshots)| snapshots).for_each(rows_of);
     let text = fs::read_to_string(table.ready().unwrap().part().at()).unwrap();
     let lines: Vec<&str> = text.lines().skip(1).collect();
     assert!(rows.len() < 5 * 4 * 33 && rows.len() > 2 * 4 * 33, "{} rows: some, not all, end early", rows.len());

@@ -11,7 +11,6 @@ use curvelax_files::{
     names, parquet,
     part_file::PartFile,
     part_folder::PartFolder,
-    place::Place,
     portraits::{self, Film},
     reader,
     tables::Table,
@@ -56,14 +55,8 @@ pub struct Complete<'a> {
 pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
     let tables = names::TABLES.into_iter().filter(|name| is_there(name));
     let shard = Some(names::SHARD).filter(|name| is_there(name));
-    let parquet = names::PARQUET.iter().any(|name| is_there(name)).then_some(PARQUET);
+    let parquet = names::parquet().any(|name| is_there(&name)).then_some(PARQUET);
     tables.chain(parquet).chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
-}
-
-/// The place of the file `name`, under its temporary name.
-fn own<'a>(files: &'a [PartFile], name: &str) -> Result<&'a Place> {
-    let file = files.iter().find(|file| file.name() == name);
-    file.map(PartFile::part).ok_or_else(|| Error::Failed(format!("{name} was not written")))
 }
 
 /// The table `name` as Parquet, if it is one of the `files`.
@@ -77,7 +70,7 @@ fn as_parquet(
     let (Some(file), Some(own)) = (files.iter().find(|file| file.name() == name), names::as_parquet(name)) else {
         return Ok(None);
     };
-    parquet::write(file.part(), &columns(name, spec, statistics)?, spec, folder.file(own)?).map(Some)
+    parquet::write(file.part(), &columns(name, spec, statistics)?, spec, folder.file(&own)?).map(Some)
 }
 
 impl Complete<'_> {
@@ -108,9 +101,7 @@ impl Complete<'_> {
         }
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);
-        let [summary, members] = [names::SUMMARY, names::MEMBERS].map(|name| own(&files, name));
-        let events = if spec.event.is_empty() { None } else { Some(own(&files, names::EVENTS)?) };
-        let explained = &reader::explained((summary?, events), members?, spec, statistics.of_limits)?;
+        let explained = &reader::explained(&|name| folder.part(name), spec, statistics.of_limits)?;
         files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
         if spec.tables == Tables::Parquet {
             for name in names::TABLES {

@@ -212,11 +212,9 @@ impl Shards {
         films.sort_by_key(|film| film.member);
         let mut seen = BTreeSet::new();
         warnings.retain(|warning| seen.insert(warning.clone()));
-        let own = |name: &str| files.iter().find(|file| file.name() == name).map(PartFile::part);
-        let none = || Error::Failed("a table of the shards was not merged".into());
-        let levels = reader::levels((own(names::LEVELS).ok_or_else(none)?, own(names::EVENT_LEVELS)), spec)?;
-        let rows = (own(names::SUMMARY).ok_or_else(none)?, own(names::EVENTS));
-        let tally = reader::rows(rows, spec, &levels, supplement)?;
+        let place = |name: &str| folder.part(name);
+        let levels = reader::levels(&place, spec)?;
+        let tally = reader::rows(&place, spec, &levels, supplement)?;
         if tally.members() != spec.member_count() {
             let (found, all) = (tally.members(), spec.member_count());
             return Err(Error::Request(format!("the shards have {found} members, and their spec has {all}")));

@@ -130,8 +130,9 @@ impl RunReport {
         if note.is_some() {
             folder.forget_last_state()?;
         }
-        let levels = reader::levels(growing.levels(), study.spec())?;
-        let tally = reader::rows(growing.rows(), study.spec(), &levels, supplement)?;
+        let place = |name: &str| folder.part(name);
+        let levels = reader::levels(&place, study.spec())?;
+        let tally = reader::rows(&place, study.spec(), &levels, supplement)?;
         let mut report = RunReport::new(folder, growing, study, origin, options);
         // Which members were to run at finer levels follows from their rows.
         let finer =
@@ -454,9 +455,9 @@ mod tests {
         let always = [&tables[..], &["plots", "rates.csv", "report.html", "run.json"]].concat();
         let csv = [&always[..], &["series.csv", "snapshots.csv", "summary.csv"]].concat();
         let parquet = csv.iter().filter_map(|name| names::as_parquet(name));
-        let mut both: Vec<&str> = csv.iter().copied().chain(parquet).collect();
+        let mut both: Vec<String> = csv.iter().map(|name| name.to_string()).chain(parquet).collect();
         both.sort_unstable();
-        assert_eq!((files(&out), both.len()), (both.iter().map(|name| name.to_string()).collect(), csv.len() + 9));
+        assert_eq!((files(&out), both.len()), (both.clone(), csv.len() + 9));
         let charts = [
             "distribution.svg",
             "excess.svg",
