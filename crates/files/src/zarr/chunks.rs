@@ -14,27 +14,12 @@ pub(super) enum DataType {
 }
 
 impl DataType {
-    pub(super) fn name(self) -> &'static str {
+    /// Its name, its fill value, and the bytes of that.
+    pub(super) fn parts(self) -> (&'static str, Value, Vec<u8>) {
         match self {
-            DataType::Float64 => "float64",
-            DataType::Int64 => "int64",
-            DataType::Int8 => "int8",
-        }
-    }
-
-    pub(super) fn fill_value(self) -> Value {
-        match self {
-            DataType::Float64 => "NaN".into(),
-            DataType::Int64 | DataType::Int8 => 0.into(),
-        }
-    }
-
-    /// The bytes of the fill value.
-    pub(super) fn fill(self) -> Vec<u8> {
-        match self {
-            DataType::Float64 => f64::NAN.to_le_bytes().into(),
-            DataType::Int64 => 0_i64.to_le_bytes().into(),
-            DataType::Int8 => vec![0],
+            DataType::Float64 => ("float64", "NaN".into(), f64::NAN.to_le_bytes().into()),
+            DataType::Int64 => ("int64", 0.into(), 0_i64.to_le_bytes().into()),
+            DataType::Int8 => ("int8", 0.into(), vec![0]),
         }
     }
 }

@@ -34,24 +34,12 @@ pub(super) struct ArrayMark {
 }
 
 impl Array {
-    pub(super) fn mark(&self) -> ArrayMark {
-        ArrayMark {
-            name: self.name.into(),
-            grid: self.grid.clone(),
-            written: self.written,
-            crc: self.crc,
-            chunk: self.chunk.clone(),
-            run_left: self.run_left,
-        }
-    }
-
     /// Continues from the mark, if it belongs to this array.
     pub(super) fn resume_from(&mut self, mark: &ArrayMark) -> bool {
-        let ArrayMark { name, grid, written, crc, chunk, run_left } = mark;
+        let ArrayMark { name, grid, written, chunk, run_left, .. } = mark;
         let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
-        let fits = fits && name == self.name && *grid == self.grid && *run_left <= self.run_bytes;
-        (self.written, self.crc, self.run_left) = (*written, *crc, *run_left);
-        self.chunk.clone_from(chunk);
+        let fits = fits && name == self.name && *grid == self.mark.grid && *run_left <= self.run_bytes;
+        self.mark.clone_from(mark);
         fits
     }
 }

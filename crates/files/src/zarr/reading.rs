@@ -23,7 +23,7 @@ pub struct StoredMembers {
 
 /// The elements of an array in order.
 pub(super) struct Elements {
-    /// The array as it grew; its `chunk` is the one being read.
+    /// The array as it grew; its mark has the chunk being read.
     array: Array,
     path: PathBuf,
     /// CRC-32C of all chunks.
@@ -44,8 +44,8 @@ impl StoredMembers {
         let Arrays { fields, status, .. } = arrays;
         let own: Vec<Array> = fields.into_iter().chain([status]).collect();
         let fits = |(array, mark): (&Array, &ArrayMark)| {
-            (array.name, &array.grid) == (mark.name.as_str(), &mark.grid)
-                && mark.written == array.grid.iter().product::<u64>()
+            (array.name, &array.mark.grid) == (mark.name.as_str(), &mark.grid)
+                && mark.written == mark.grid.iter().product::<u64>()
         };
         if own.len() != mark.arrays.len() || !own.iter().zip(&mark.arrays).all(fits) {
             return Err(Error::Request(format!("{}: it has not the arrays of its spec", path.display())));
@@ -66,7 +66,7 @@ impl StoredMembers {
     /// # Errors
     /// [`Error::Request`] naming the array that differs.
     pub fn check(&self) -> Result<()> {
-        match self.arrays.iter().find(|own| own.array.crc != own.crc) {
+        match self.arrays.iter().find(|own| own.array.mark.crc != own.crc) {
             None => Ok(()),
             Some(own) => Err(own.changed("their checksum differs")),
         }
@@ -83,29 +83,30 @@ impl Elements {
 
     /// Returns the next elements, in at most `most` bytes.
     pub(super) fn next(&mut self, most: usize) -> Result<&[u8]> {
-        if self.taken == self.array.chunk.len() {
+        if self.taken == self.array.mark.chunk.len() {
             self.read()?;
         }
-        let first = self.taken;
-        self.taken = self.array.chunk.len().min(first + most);
-        Ok(&self.array.chunk[first..self.taken])
+        let (first, chunk) = (self.taken, &self.array.mark.chunk);
+        self.taken = chunk.len().min(first + most);
+        Ok(&chunk[first..self.taken])
     }
 
     /// Reads the next chunk, and removes the part beyond the array.
     fn read(&mut self) -> Result<()> {
-        let Array { chunk_bytes, grid, written, run_left, run_bytes, .. } = &self.array;
+        let (chunk_bytes, ArrayMark { grid, written, .. }) = (self.array.chunk_bytes, &self.array.mark);
         let path = self.path.join(key(*written, grid));
-        let chunk = input::bytes(&path, *chunk_bytes as u64);
+        let chunk = input::bytes(&path, chunk_bytes as u64);
         let mut chunk = chunk.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-        if chunk.len() != *chunk_bytes {
+        if chunk.len() != chunk_bytes {
             return Err(self.changed(&format!("chunk {written} has {} bytes of {chunk_bytes}", chunk.len())));
         }
-        let crc = crc32c::crc32c_append(self.array.crc, &chunk);
-        chunk.truncate(usize::try_from(*run_left).unwrap_or(usize::MAX));
-        let left = run_left - chunk.len() as u64;
-        (self.array.run_left, self.array.crc) = (if left == 0 { *run_bytes } else { left }, crc);
-        (self.array.chunk, self.taken) = (chunk, 0);
-        self.array.written += 1;
+        let mark = &mut self.array.mark;
+        mark.crc = crc32c::crc32c_append(mark.crc, &chunk);
+        chunk.truncate(usize::try_from(mark.run_left).unwrap_or(usize::MAX));
+        let left = mark.run_left - chunk.len() as u64;
+        mark.run_left = if left == 0 { self.array.run_bytes } else { left };
+        (mark.chunk, self.taken) = (chunk, 0);
+        mark.written += 1;
         Ok(())
     }
 }

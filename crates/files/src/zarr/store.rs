@@ -4,7 +4,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     array::Array,
-    chunks::{CHUNK_BYTES, DataType},
+    chunks::CHUNK_BYTES,
     layout::{Arrays, arrays, nearest, of_group, times},
     mark::StoreMark,
     reading::StoredMembers,
@@ -91,7 +91,7 @@ impl SnapshotStore {
     /// Leaves the times before the one at `place` unknown.
     fn skip_to(&mut self, place: usize) -> Result<()> {
         if self.filled < place {
-            let unknown: Vec<u8> = DataType::Float64.fill().repeat(self.points);
+            let unknown: Vec<u8> = f64::NAN.to_le_bytes().repeat(self.points);
             for array in &mut self.fields {
                 (self.filled..place).try_for_each(|_| array.push(&self.folder, &unknown))?;
             }
@@ -116,7 +116,7 @@ impl SnapshotStore {
     /// Returns its extent, once it is on disk.
     pub fn mark(&self) -> Result<StoreMark> {
         self.folder.sync()?;
-        Ok(StoreMark { arrays: self.fields.iter().chain([&self.status]).map(Array::mark).collect() })
+        Ok(StoreMark { arrays: self.fields.iter().chain([&self.status]).map(|array| array.mark.clone()).collect() })
     }
 
     /// Sets whether to keep it if the run fails.
