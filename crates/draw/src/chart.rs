@@ -215,6 +215,16 @@ impl Heading<'_> {
         (svg, top)
     }
 
+    /// A picture with this heading that says why there is nothing to draw, recognised by [`reason`].
+    pub fn nothing(&self, medium: Medium, reason: &str) -> String {
+        let (mut svg, top) = self.begin(medium, 180.0);
+        svg.open(NOTHING);
+        let size = DVec2::new(medium.width() - 2.0 * MARGIN, 180.0 - MARGIN);
+        say(&mut svg, DVec2::new(MARGIN, top), size, reason);
+        svg.close();
+        svg.finish()
+    }
+
     /// The rows of the legend, each entry with its position. A label that is too long is cut on a screen, where the
     /// text of the page has the rest, and broken into lines on paper.
     fn rows(&self, room: f64, medium: Medium) -> Vec<Vec<(f64, Entry)>> {
@@ -355,34 +365,16 @@ impl Panel<'_> {
         let at = DVec2::new(self.corner.x - from_left, self.corner.y + 0.5 * self.size.y);
         svg.text_upwards("axis middle", at, &name);
     }
-
-    /// Writes a sentence in the middle, if there is nothing to draw.
-    pub fn say(&self, svg: &mut Svg, sentence: &str) {
-        svg.rectangle("frame", self.corner, self.size, 0.0);
-        let lines = wrapped(sentence, SIZE, self.size.x - 24.0);
-        let first = self.corner + 0.5 * self.size - DVec2::new(0.0, 0.5 * LINE * (lines.len() as f64 - 1.0) - 4.0);
-        for (i, line) in lines.iter().enumerate() {
-            svg.text("note middle", first + DVec2::new(0.0, i as f64 * LINE), line);
-        }
-    }
 }
 
-/// A picture that says why there is nothing to draw, recognised by [`reason`].
-pub fn nothing(medium: Medium, title: &str, sentences: Vec<String>, reason: &str) -> String {
-    let (mut svg, top) = Heading { title, sentences, legend: Vec::new() }.begin(medium, 180.0);
-    let axis = Axis::new("", "", Scale::Linear, (0.0, 1.0));
-    let panel = Panel {
-        heading: "",
-        corner: DVec2::new(MARGIN, top),
-        size: DVec2::new(medium.width() - 2.0 * MARGIN, 180.0 - MARGIN),
-        x: &axis,
-        y: &axis,
-        labels_x: false,
-    };
-    svg.open(NOTHING);
-    panel.say(&mut svg, reason);
-    svg.close();
-    svg.finish()
+/// Writes a sentence into an empty frame, if there is nothing to draw in it.
+pub fn say(svg: &mut Svg, corner: DVec2, size: DVec2, sentence: &str) {
+    svg.rectangle("frame", corner, size, 0.0);
+    let lines = wrapped(sentence, SIZE, size.x - 24.0);
+    let first = corner + 0.5 * size - DVec2::new(0.0, 0.5 * LINE * (lines.len() as f64 - 1.0) - 4.0);
+    for (i, line) in lines.iter().enumerate() {
+        svg.text("note middle", first + DVec2::new(0.0, i as f64 * LINE), line);
+    }
 }
 
 /// Class of the sentence in the place of a picture.
@@ -403,6 +395,27 @@ pub fn sample(entry: &Entry) -> String {
     svg.finish()
 }
 
+/// What is said of a chart, and what distinguishes its curves.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ChartText {
+    /// First line.
+    pub title: String,
+    /// A sentence below it, or nothing.
+    pub note: String,
+    /// The time that is drawn, `t_relax` or its limit.
+    pub quantity: String,
+    /// What distinguishes the curves.
+    pub key: CellKey,
+}
+
+impl ChartText {
+    /// The heading with the note and `more` sentences, without a legend.
+    pub fn heading(&self, more: impl IntoIterator<Item = String>) -> Heading<'_> {
+        let sentences = [self.note.clone()].into_iter().chain(more).collect();
+        Heading { title: &self.title, sentences, legend: Vec::new() }
+    }
+}
+
 /// What distinguishes the curves of a chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellKey {
@@ -410,8 +423,12 @@ pub struct CellKey {
     pub name: String,
     /// Two quantities, of which colours show one and dashes or panels the other.
     pub crossed: Option<Crossed>,
-    /// Names of the curves for the colour bar, if the quantity is no number: those next to its colours.
+    /// The entry of each curve in the legend.
+    pub labels: Vec<String>,
+    /// Names of the curves where the quantity need not be named: next to the colour bar, if it is no number.
     pub names: Vec<String>,
+    /// Its values, if it is a number: the colours are in their order.
+    pub values: Option<Vec<f64>>,
     /// Another legend names the curves, as one for all charts of a page does.
     pub named_elsewhere: bool,
 }
@@ -466,10 +483,10 @@ pub struct Colours {
 }
 
 impl Colours {
-    /// Colours for one curve per value of `key`. If a value is unknown, or there is none, curves are numbered from 0
-    /// and ordered by that.
-    pub fn of(values: &[Option<f64>], cells: &CellKey) -> Colours {
-        let (count, key) = (values.len(), cells.clone());
+    /// Colours for `count` curves. If a value of the key is unknown, or there is none, curves are numbered from 0 and
+    /// ordered by that.
+    pub fn of(count: usize, cells: &CellKey) -> Colours {
+        let key = cells.clone();
         // Nothing else is drawn where the curves are not those of the quantities.
         let crossed = cells.crossed.as_ref().filter(|crossed| crossed.places.len() == count);
         if let Some(crossed) = crossed.filter(|crossed| crossed.fits()) {
@@ -480,7 +497,8 @@ impl Colours {
             return Colours { key, shown: (0..count).map(|i| (i, format!("s{i}"))).collect(), bar: None };
         }
         let known = |value: &f64| Scale::Linear.holds(*value);
-        let given: Option<Vec<f64>> = values.iter().map(|value| value.filter(known)).collect();
+        let given = cells.values.as_ref().and_then(|values| values.get(..count));
+        let given = given.filter(|values| values.iter().all(known));
         let names = if given.is_none() && key.names.len() == count { key.names } else { Vec::new() };
         let names = distinct(&names, SIZE, MAX_NAME);
         // Names that stay wide leave no room for curves.
@@ -488,7 +506,7 @@ impl Colours {
         let names = if fit { names } else { Vec::new() };
         let name = if given.is_some() || !names.is_empty() { &cells.name[..] } else { "cell" };
         let key = CellKey { names, ..key };
-        let values = given.unwrap_or_else(|| (0..count).map(|i| i as f64).collect());
+        let values = given.map_or_else(|| (0..count).map(|i| i as f64).collect(), <[f64]>::to_vec);
         let scale = Scale::of(values.iter().copied());
         let ends = range(values.iter().copied()).filter(|(low, high)| low < high);
         let axis = match ends {
@@ -508,21 +526,20 @@ impl Colours {
         Colours { key, shown: picked.map(class).collect(), bar: Some(axis) }
     }
 
-    /// Legend entries of distinct curves, named by `label`; none where another legend has them.
-    pub fn legend<'a>(&self, label: impl Fn(usize) -> &'a str) -> impl Iterator<Item = Entry> {
-        let named = |(i, class): &(usize, String)| Entry::new(class, LegendMark::Series, label(*i));
-        let entries: Vec<Entry> = match &self.key.crossed {
+    /// Legend entries of distinct curves; none where another legend has them.
+    pub fn legend(&self) -> Vec<Entry> {
+        match &self.key.crossed {
             _ if self.key.named_elsewhere => Vec::new(),
             Some(crossed) if crossed.places.len() >= self.shown.len() => crossed.entries(),
-            _ if self.bar.is_none() => self.shown.iter().map(named).collect(),
-            _ => Vec::new(),
-        };
-        entries.into_iter()
+            _ => self.distinct(LegendMark::Series),
+        }
     }
 
-    /// Whether another legend names the curves.
-    pub fn named_elsewhere(&self) -> bool {
-        self.key.named_elsewhere
+    /// Entries of the curves with a colour of their own; none where colours are ordered.
+    pub fn distinct(&self, mark: LegendMark) -> Vec<Entry> {
+        let label = |i: usize| self.key.labels.get(i).map_or("", String::as_str);
+        let distinct = self.shown.iter().filter(|_| self.bar.is_none());
+        distinct.map(|(i, class)| Entry::new(class, mark, label(*i))).collect()
     }
 
     /// The marker of the curve drawn at this rank: ordered colours need no shapes.

@@ -22,10 +22,6 @@ const LEAST: f64 = 1.5;
 /// A number of each member of one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellValues {
-    /// Its entry in the legend, if there are several cells.
-    pub label: String,
-    /// The value of a numeric key, for the colour bar.
-    pub value: Option<f64>,
     /// The numbers of the members that have one, in any order.
     pub numbers: Vec<f64>,
     /// All members.
@@ -231,7 +227,7 @@ mod tests {
 
     #[test]
     fn cells_share_their_bounds_and_count_their_own_members() {
-        let cell = |numbers: Vec<f64>| CellValues { members: numbers.len() as u64, numbers, ..CellValues::default() };
+        let cell = |numbers: Vec<f64>| CellValues { members: numbers.len() as u64, numbers };
         for (first, other) in [
             (
                 (0..500).map(|i| 1.0 + 0.001 * f64::from(i)).collect(),

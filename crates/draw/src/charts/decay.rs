@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, drawable, nothing},
+    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel, drawable},
     medium::Medium,
     trace,
 };
@@ -21,15 +21,10 @@ const BELOW: f64 = 1e-2;
 /// Mean excess of the cells of a study against time, on a logarithmic axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Decay<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it that says over which members the mean is, or nothing.
-    pub note: &'a str,
+    /// What is said of it; the note says over which members the mean is.
+    pub text: ChartText,
     /// Meaning of the bands, such as `5 to 95 % of the members`.
     pub band: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
-    /// many.
-    pub key: CellKey,
     /// The curves, in the order of the legend.
     pub curves: Vec<DecayCurve>,
     /// Theoretical lines to compare with.
@@ -41,10 +36,6 @@ pub struct Decay<'a> {
 /// The mean excess of one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DecayCurve {
-    /// Its entry in the legend.
-    pub label: String,
-    /// The value of a numeric key, for the colour bar.
-    pub value: Option<f64>,
     /// Ascending times, in length⁴.
     pub t: Vec<f64>,
     /// Mean excess at each time.
@@ -123,29 +114,24 @@ impl DecayCurve {
 impl Decay<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let Decay { title, note, curves, theory, .. } = self;
-        let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
-        let colours = Colours::of(&values, &self.key);
-        let sentences = vec![(*note).into(), colours.sentence(curves.len())];
+        let Decay { text, curves, theory, .. } = self;
+        let colours = Colours::of(curves.len(), &text.key);
+        let mut heading = text.heading([colours.sentence(curves.len())]);
         let times = || curves.iter().flat_map(|curve| curve.t.iter().copied());
         let scale = self.time.filter(|scale| times().any(|t| scale.holds(t))).unwrap_or(Scale::Linear);
         let drawn = |curve: &DecayCurve| {
             curve.t.iter().zip(&curve.mean).filter(|(t, mean)| drawable((scale, **t), (Scale::Log, **mean))).count()
         };
         match curves.iter().map(drawn).max() {
-            None | Some(0) => return nothing(medium, title, sentences, "There is no positive mean excess to draw."),
+            None | Some(0) => return heading.nothing(medium, "There is no positive mean excess to draw."),
             Some(1) => {
-                return nothing(
-                    medium,
-                    title,
-                    sentences,
-                    "The mean excess is known at one time only: there is no line to draw.",
-                );
+                let reason = "The mean excess is known at one time only: there is no line to draw.";
+                return heading.nothing(medium, reason);
             }
             _ => {}
         }
         let bands = self.has_bands();
-        let heading = Heading { title, sentences, legend: self.legend(&colours, bands) };
+        heading.legend = self.legend(&colours, bands);
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
         let across = Axis::over("t", TIME, scale, times()).with_zero();
@@ -188,9 +174,8 @@ impl Decay<'_> {
     }
 
     fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {
-        let curves = colours.legend(|i| &self.curves[i].label);
         let band = bands.then(|| Entry::new("faint", LegendMark::Band, self.band));
         let theory = self.theory.iter().map(|theory| Entry::new("ink", LegendMark::Dashed, &theory.label));
-        curves.chain(band).chain(theory).collect()
+        colours.legend().into_iter().chain(band).chain(theory).collect()
     }
 }

@@ -2,12 +2,12 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{TIME, only_panel};
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable,
-        nothing, triangle_right, triangle_up,
+        ChartText, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable,
+        triangle_right, triangle_up,
     },
     medium::Medium,
     svg::{Svg, coordinate},
@@ -34,17 +34,10 @@ const SPREAD: f64 = 24.0;
 /// t_relax against a swept key.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dependence<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
-    /// The time that is drawn, t_relax or its limit.
-    pub quantity: &'a str,
+    /// What is said of it, with the other keys, which distinguish the series.
+    pub text: ChartText,
     /// The key.
     pub key: &'a str,
-    /// Name of the quantity that distinguishes the series, for the colour bar that replaces the legend if there are
-    /// many.
-    pub other_key: CellKey,
     /// One series, or one per setting of the other keys.
     pub series: Vec<Series>,
     /// Scale of a numeric key; by default that of [`Scale::of`], or logarithmic if there is a power law.
@@ -56,10 +49,6 @@ pub struct Dependence<'a> {
 /// t_relax at all settings of the key.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Series {
-    /// Its entry in the legend, if there are several.
-    pub label: String,
-    /// The value of the other key if it is a number, for the colour bar.
-    pub value: Option<f64>,
     /// The settings; those of a numeric key ascend.
     pub levels: Vec<DependencePoint>,
     /// The law fitted to them.
@@ -183,22 +172,22 @@ impl Series {
 impl Dependence<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let values: Vec<Option<f64>> = self.series.iter().map(|series| series.value).collect();
-        let colours = Colours::of(&values, &self.other_key);
-        let mut sentences = vec![self.note.into(), colours.sentence(self.series.len()), self.missing()];
+        let colours = Colours::of(self.series.len(), &self.text.key);
+        let mut heading = self.text.heading([colours.sentence(self.series.len()), self.missing()]);
         if !self.levels().any(|level| level.times().next().is_some()) {
             let reason = match self.levels().count() {
                 0 => "There are no cells to compare.",
                 1 => "Too few members of the only cell relaxed for a median.",
                 _ => "In no cell did enough members relax for a median.",
             };
-            sentences.pop();
-            return nothing(medium, self.title, sentences, reason);
+            heading.sentences.pop();
+            return heading.nothing(medium, reason);
         }
-        if self.named() {
-            return self.draw_named(medium, &colours, sentences);
+        heading.legend = self.legend(&colours);
+        match self.named() {
+            true => self.draw_named(medium, &colours, heading),
+            false => self.draw_numeric(medium, &colours, &heading),
         }
-        self.draw_numeric(medium, &colours, sentences)
     }
 
     fn levels(&self) -> impl Iterator<Item = &DependencePoint> {
@@ -230,23 +219,19 @@ impl Dependence<'_> {
 
     fn time_axis(&self) -> Axis {
         let times: Vec<f64> = self.levels().flat_map(DependencePoint::times).collect();
-        let axis = Axis::over(self.quantity, TIME, self.scale(self.time, &times), times.iter().copied());
+        let axis = Axis::over(&self.text.quantity, TIME, self.scale(self.time, &times), times.iter().copied());
         match range(times) {
             Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.with_zero(),
             _ => axis,
         }
     }
 
-    fn draw_numeric(&self, medium: Medium, colours: &Colours, sentences: Vec<String>) -> String {
+    fn draw_numeric(&self, medium: Medium, colours: &Colours, heading: &Heading) -> String {
         let settings: Vec<f64> = self.levels().filter_map(DependencePoint::number).collect();
         let across = Axis::over(self.key, "", self.scale(self.across, &settings), settings);
         let time = self.time_axis();
-        let heading = Heading { title: self.title, sentences, legend: self.legend(colours) };
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
-        let left = Panel::left(&time, HEIGHT);
-        let size = DVec2::new(svg.width() - left - MARGIN - colours.room(HEIGHT), HEIGHT);
-        let corner = DVec2::new(left, top + 8.0);
-        let panel = Panel { heading: "", corner, size, x: &across, y: &time, labels_x: true };
+        let panel = only_panel(&svg, [&across, &time], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
         for (rank, (i, class)) in colours.shown.iter().enumerate() {
             let series = &self.series[*i];
@@ -274,7 +259,7 @@ impl Dependence<'_> {
     }
 
     /// Draws named settings one below the other, with time across, so that names are not rotated.
-    fn draw_named(&self, medium: Medium, colours: &Colours, mut sentences: Vec<String>) -> String {
+    fn draw_named(&self, medium: Medium, colours: &Colours, mut heading: Heading) -> String {
         let mut names: Vec<String> = Vec::new();
         for level in self.levels() {
             let name = level.name();
@@ -283,12 +268,11 @@ impl Dependence<'_> {
             }
         }
         if names.len() > MAX_ROWS {
-            sentences.push(format!("The first {MAX_ROWS} of {} settings are drawn.", names.len()));
+            heading.sentences.push(format!("The first {MAX_ROWS} of {} settings are drawn.", names.len()));
             names.truncate(MAX_ROWS);
         }
         let row = ROW + FURTHER * (colours.shown.len().min(crate::style::SERIES) as f64 - 1.0).max(0.0);
         let height = row * names.len() as f64;
-        let heading = Heading { title: self.title, sentences, legend: self.legend(colours) };
         let (mut svg, top) = heading.begin(medium, 28.0 + height + FOOT);
 
         let (time, most) = (self.time_axis(), medium.name(MAX_NAME));
@@ -333,11 +317,11 @@ impl Dependence<'_> {
         let several = self.series.len() > 1;
         let neutral = if several { "faint" } else { "s0" };
         let distinct = colours.shown.iter().filter(|_| several && colours.bar.is_none());
-        let label = |series: &Series| match series.law() {
-            Some(fit) => format!("{}: p = {}", series.label, fit.exponent.shown()),
-            None => series.label.clone(),
+        let label = |i: usize| match (self.series[i].law(), &self.text.key.labels[i]) {
+            (Some(fit), label) => format!("{label}: p = {}", fit.exponent.shown()),
+            (None, label) => label.clone(),
         };
-        let series = distinct.map(|(i, class)| Entry::new(class, LegendMark::Marker(*i), &label(&self.series[*i])));
+        let series = distinct.map(|(i, class)| Entry::new(class, LegendMark::Marker(*i), &label(*i)));
         let any = |has: &dyn Fn(&DependencePoint) -> bool, mark: LegendMark, label: &str| {
             self.levels().any(has).then(|| Entry::new(neutral, mark, label))
         };
@@ -354,11 +338,8 @@ impl Dependence<'_> {
         let fit = self.series.iter().find_map(Series::law).map(|fit| {
             let exponent = if several { String::new() } else { format!(", p = {}", fit.exponent.shown()) };
             let verdict = if fit.rejected { "; χ² rejects a power law" } else { "" };
-            Entry::new(
-                neutral,
-                LegendMark::Dashed,
-                &format!("fit: {} ∝ {}ᵖ{exponent}{verdict}", self.quantity, self.key),
-            )
+            let law = format!("fit: {} ∝ {}ᵖ{exponent}{verdict}", self.text.quantity, self.key);
+            Entry::new(neutral, LegendMark::Dashed, &law)
         });
         series.chain(median).chain(interval).chain(quartiles).chain(beyond).chain(fit).collect()
     }

@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, nothing},
+    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, MARGIN, Panel, say},
     medium::Medium,
     svg::{Svg, coordinate, dots},
     width::{SIZE, distinct, shortened, width},
@@ -28,14 +28,8 @@ const NORMAL_QUARTILES: f64 = 1.348_979_500_392_163_6;
 /// Times by cell, and how they are distributed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TimeDistribution<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it.
-    pub note: &'a str,
-    /// The time.
-    pub quantity: &'a str,
-    /// What distinguishes the cells.
-    pub key: CellKey,
+    /// What is said of it; the boxes have the names of the cells.
+    pub text: ChartText,
     /// What their names are, above these.
     pub keys: &'a str,
     /// The cells.
@@ -45,10 +39,6 @@ pub struct TimeDistribution<'a> {
 /// The times of one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CellQuantiles {
-    /// Its name.
-    pub label: String,
-    /// The value of a numeric key, for the colours.
-    pub value: Option<f64>,
     /// The 5, 25, 50, 75 and 95 % quantiles, as far as they are known.
     pub places: [Option<f64>; 5],
     /// Ascending quantiles: that of the standard normal law, and the time.
@@ -66,8 +56,8 @@ impl CellQuantiles {
         all.filter(|(z, y)| Scale::Linear.holds(*z) && Scale::Linear.holds(*y)).collect()
     }
 
-    /// The box in a row at the height `y`.
-    fn draw(&self, svg: &mut Svg, panel: &Panel, y: f64) {
+    /// The box of the cell of this name in a row at the height `y`.
+    fn draw(&self, svg: &mut Svg, panel: &Panel, y: f64, name: &str) {
         let known = |i: usize| self.places[i].filter(|t| panel.x.holds(*t)).map(|t| panel.across(t));
         let ends: Vec<f64> = (0..self.places.len()).filter_map(known).collect();
         let (Some(first), Some(last)) = (ends.first(), ends.last()) else { return };
@@ -84,7 +74,7 @@ impl CellQuantiles {
             shown.unwrap_or("unknown".into())
         });
         svg.open("thin");
-        svg.hinted_path(&lines, &format!("{}: 5, 25, 50, 75, 95 %: {}", self.label, shown.join(", ")));
+        svg.hinted_path(&lines, &format!("{name}: 5, 25, 50, 75, 95 %: {}", shown.join(", ")));
         svg.close();
         if let Some(median) = known(2) {
             svg.path("cross", &format!("M{} {top}V{bottom}", coordinate(median)));
@@ -95,17 +85,17 @@ impl CellQuantiles {
 impl TimeDistribution<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let TimeDistribution { title, note, quantity, key, keys, cells } = self;
-        let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
-        let colours = Colours::of(&values, key);
-        let sentences = vec![(*note).into(), colours.sentence(cells.len())];
+        let TimeDistribution { text, keys, cells } = self;
+        let colours = Colours::of(cells.len(), &text.key);
+        let mut heading = text.heading([colours.sentence(cells.len())]);
         let times = || cells.iter().flat_map(|cell| cell.places.iter().flatten().copied());
         if times().next().is_none() {
-            return nothing(medium, title, sentences, "Too few members relaxed for a quantile.");
+            return heading.nothing(medium, "Too few members relaxed for a quantile.");
         }
         let rows = colours.shown.len();
         let boxes = ROW * rows as f64 + 8.0;
-        let heading = Heading { title, sentences, legend: self.legend() };
+        let law = "a normal or lognormal distribution with these quartiles";
+        heading.legend = vec![Entry::new("faint", LegendMark::Dashed, law)];
         let of: [fn(f64) -> f64; 2] = [|t| t, f64::ln];
         let all = of.map(|of| cells.iter().map(|cell| cell.standardised(of)).collect::<Vec<_>>());
         let mut groups = self.groups(&colours);
@@ -117,12 +107,12 @@ impl TimeDistribution<'_> {
         let above = if rows > 1 { 24.0 } else { 8.0 };
         let (mut svg, top) = heading.begin(medium, above + boxes + FOOT + laws);
 
-        let names: Vec<String> = colours.shown.iter().map(|(i, _)| cells[*i].label.clone()).collect();
-        let names = if rows > 1 { distinct(&names, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
+        let own: Vec<String> = colours.shown.iter().map(|(i, _)| text.key.names[*i].clone()).collect();
+        let names = if rows > 1 { distinct(&own, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
         let keys = if rows > 1 { *keys } else { "" };
         let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
-        let across = Axis::over(quantity, TIME, scale, times());
+        let across = Axis::over(&text.quantity, TIME, scale, times());
         let nothing = Axis::new("", "", Scale::Linear, (0.0, 1.0));
         let (corner, size) = (DVec2::new(left, top + above), DVec2::new(svg.width() - left - MARGIN, boxes));
         let panel = Panel { heading: "", corner, size, x: &across, y: &nothing, labels_x: true };
@@ -132,7 +122,7 @@ impl TimeDistribution<'_> {
             let y = corner.y + 4.0 + ROW * (row as f64 + 0.5);
             svg.text_unless_empty("y tick end", DVec2::new(left - 6.0, y + 4.0), name);
             svg.open(class);
-            cells[*cell].draw(&mut svg, &panel, y);
+            cells[*cell].draw(&mut svg, &panel, y, &own[row]);
             svg.close();
         }
         panel.draw_frame(&mut svg);
@@ -150,7 +140,7 @@ impl TimeDistribution<'_> {
     /// The cells side by side in one pair of panels, with its name: those of one value of the quantity that colours do
     /// not show.
     fn groups<'a>(&'a self, colours: &'a Colours) -> Vec<(&'a str, Vec<&'a (usize, String)>)> {
-        let Some(crossed) = &self.key.crossed else { return vec![("", colours.shown.iter().collect())] };
+        let Some(crossed) = &self.text.key.crossed else { return vec![("", colours.shown.iter().collect())] };
         let of = |pattern: usize| {
             colours.shown.iter().filter(move |(i, _)| crossed.places.get(*i).is_some_and(|place| place.1 == pattern))
         };
@@ -190,7 +180,7 @@ impl TimeDistribution<'_> {
             let heading = shortened(&heading, SIZE, size.x);
             let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
             if own(all).is_empty() {
-                panel.say(svg, "The quartiles are not known, or equal.");
+                say(svg, corner, size, "The quartiles are not known, or equal.");
                 continue;
             }
             panel.draw_x(svg);
@@ -215,10 +205,5 @@ impl TimeDistribution<'_> {
         svg.open("faint");
         svg.path("dashed", &format!("M{sx} {sy}L{ex} {ey}"));
         svg.close();
-    }
-
-    fn legend(&self) -> Vec<Entry> {
-        let text = "a normal or lognormal distribution with these quartiles";
-        vec![Entry::new("faint", LegendMark::Dashed, text)]
     }
 }

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::TIME;
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, Heading, LegendMark, MARGIN, Panel, nothing, triangle_right},
+    chart::{ChartText, Entry, FOOT, LegendMark, MARGIN, Panel, triangle_right},
     medium::Medium,
     svg::{Svg, coordinate, dots},
     trace,
@@ -21,12 +21,8 @@ const NAME: f64 = 260.0;
 /// The times of a few members.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MemberTimes<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it.
-    pub note: &'a str,
-    /// The time.
-    pub quantity: &'a str,
+    /// What is said of it.
+    pub text: ChartText,
     /// What the names are.
     pub names: &'a str,
     /// The members, from top to bottom.
@@ -76,21 +72,21 @@ impl MemberDot {
 impl MemberTimes<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let MemberTimes { title, note, quantity, names, members } = self;
-        let sentences = vec![(*note).into()];
+        let MemberTimes { text, names, members } = self;
+        let mut heading = text.heading([]);
         let reached = || members.iter().filter(|member| member.happened).map(|member| member.t);
         let scale = Scale::of(members.iter().map(|member| member.t));
         if !members.iter().any(|member| member.is_drawable(scale)) {
-            return nothing(medium, title, sentences, "No member has a time.");
+            return heading.nothing(medium, "No member has a time.");
         }
         let height = ROW * members.len() as f64;
-        let heading = Heading { title, sentences, legend: self.legend() };
+        heading.legend = self.legend();
         let (mut svg, top) = heading.begin(medium, 24.0 + height + FOOT);
         let all: Vec<String> = members.iter().map(|member| member.name.clone()).collect();
         let shown = distinct(&all, SIZE, medium.name(NAME));
         let left = MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(names, SIZE), f64::max);
         let times = members.iter().flat_map(MemberDot::ends).chain(members.iter().map(|member| member.t));
-        let across = Axis::over(quantity, TIME, scale, times);
+        let across = Axis::over(&text.quantity, TIME, scale, times);
         // From 0 where all times are far from equal: the eye then compares lengths.
         let range = reached().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
         let across = if range.0 < 0.7 * range.1 { across.with_zero() } else { across };
@@ -118,9 +114,10 @@ impl MemberTimes<'_> {
         let any = |has: &dyn Fn(&MemberDot) -> bool, mark: LegendMark, label: &str| {
             self.members.iter().any(has).then(|| Entry::new("s0", mark, label))
         };
-        let time = any(&|member| member.happened, LegendMark::Marker(0), self.quantity);
+        let quantity = &self.text.quantity;
+        let time = any(&|member| member.happened, LegendMark::Marker(0), quantity);
         let bar = any(&|member| member.error.is_some(), LegendMark::Thin, "95 % interval");
-        let ended = any(&|member| !member.happened, LegendMark::Right, &format!("ended without {}", self.quantity));
+        let ended = any(&|member| !member.happened, LegendMark::Right, &format!("ended without {quantity}"));
         time.into_iter().chain(bar).chain(ended).collect()
     }
 }

@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, say},
     medium::Medium,
     svg::Svg,
     width::{SIZE, shortened},
@@ -78,12 +78,9 @@ impl MeshMeasure {
 
     /// Draws the panel from `corner`, `width` wide including its labels.
     fn draw(&self, svg: &mut Svg, corner: DVec2, width: f64, bound: Option<f64>) {
-        let empty = Axis::new(self.name, "", Scale::Linear, (0.0, 1.0));
         let Some(bins) = &self.bins else {
-            let size = DVec2::new(width - MARGIN, HEIGHT);
-            let corner = corner + DVec2::new(MARGIN, 0.0);
-            let panel = Panel { heading: "", corner, size, x: &empty, y: &empty, labels_x: false };
-            return panel.say(svg, &format!("No member has a {}.", self.name));
+            let (corner, size) = (corner + DVec2::new(MARGIN, 0.0), DVec2::new(width - MARGIN, HEIGHT));
+            return say(svg, corner, size, &format!("No member has a {}.", self.name));
         };
         let (across, members) = (bins.axis(self.name, "", self.scale), Axis::counts("members", bins.most()));
         let left = Panel::left(&members, HEIGHT);

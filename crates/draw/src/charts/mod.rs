@@ -28,7 +28,7 @@ pub use scatter::{Scatter, ScatterPanel, ScatterPoint};
 pub use survival::{Survival, SurvivalCurve};
 pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 
-pub use super::chart::{CellKey, Crossed, EstimatedNumber};
+pub use super::chart::{CellKey, ChartText, Crossed, EstimatedNumber};
 
 use glam::DVec2;
 

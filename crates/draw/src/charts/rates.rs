@@ -6,7 +6,7 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, nothing},
+    chart::{ChartText, Colours, Entry, FOOT, LegendMark},
     medium::Medium,
 };
 use curvelax_base::text::{count, significant};
@@ -16,13 +16,8 @@ const HEIGHT: f64 = 200.0;
 /// Fitted rates of the members.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FittedRates<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
-    /// Name of the quantity that distinguishes the cells, for the colour bar that replaces the legend if there are
-    /// many.
-    pub key: CellKey,
+    /// What is said of it.
+    pub text: ChartText,
     /// Rates relative to theory; or rates in `unit`, if there is no theory; cell by cell.
     pub cells: Vec<CellValues>,
     /// Whether they are relative to theory.
@@ -36,15 +31,15 @@ pub struct FittedRates<'a> {
 impl FittedRates<'_> {
     /// The text of an SVG file.
     pub fn draw(self, medium: Medium) -> String {
-        let FittedRates { title, note, key, mut cells, relative, unit, without } = self;
+        let FittedRates { text, mut cells, relative, unit, without } = self;
         CellValues::sort(&mut cells);
         let without = match without {
             0 => String::new(),
             without => format!("{} without a rate: fewer than 8 points in the window.", count(without, "member")),
         };
         if cells.iter().all(|cell| cell.numbers.is_empty()) {
-            let sentences = vec![note.into(), without];
-            return nothing(medium, title, sentences, "No member was followed closely enough for a rate to be fitted.");
+            let reason = "No member was followed closely enough for a rate to be fitted.";
+            return text.heading([without]).nothing(medium, reason);
         }
         let middle = match &cells[..] {
             [CellValues { numbers, .. }] => {
@@ -53,8 +48,7 @@ impl FittedRates<'_> {
             }
             _ => String::new(),
         };
-        let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
-        let colours = Colours::of(&values, &key);
+        let colours = Colours::of(cells.len(), &text.key);
         let positive = cells.iter().filter_map(|cell| cell.numbers.first()).all(|rate| *rate > 0.0);
         let scale = if positive { CellValues::scale(&cells) } else { Scale::Linear };
         let bins = Bins::shared(&cells, scale);
@@ -62,11 +56,11 @@ impl FittedRates<'_> {
         let (across, members) =
             (bins[0].axis(name, unit, scale), Axis::counts("members", bins.iter().map(Bins::most).max().unwrap_or(0)));
         let shown = relative && across.holds(1.0);
-        let named = colours.legend(|i| &cells[i].label).filter(|_| cells.len() > 1);
+        let named = colours.legend().into_iter().filter(|_| cells.len() > 1);
         let theory = shown.then(|| Entry::new("ink", LegendMark::Dashed, "linear theory"));
-        let legend = named.chain(theory).collect();
-        let sentences = vec![note.into(), middle, without, colours.sentence(cells.len())];
-        let (mut svg, top) = Heading { title, sentences, legend }.begin(medium, HEIGHT + FOOT + 8.0);
+        let mut heading = text.heading([middle, without, colours.sentence(cells.len())]);
+        heading.legend = named.chain(theory).collect();
+        let (mut svg, top) = heading.begin(medium, HEIGHT + FOOT + 8.0);
         let panel = only_panel(&svg, [&across, &members], top, HEIGHT, colours.room(HEIGHT));
         panel.draw_x(&mut svg);
         panel.draw_y(&mut svg);

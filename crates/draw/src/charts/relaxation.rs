@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, nothing},
+    chart::{ChartText, Colours, Entry, EstimatedNumber, FOOT, LegendMark, MARGIN, Panel},
     medium::Medium,
     trace,
 };
@@ -26,14 +26,8 @@ const GAP: f64 = 16.0;
 /// Relaxation times of the members of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RelaxationTimes<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
-    /// The time, t_relax or its limit.
-    pub quantity: &'a str,
-    /// What distinguishes the cells.
-    pub key: CellKey,
+    /// What is said of it.
+    pub text: ChartText,
     /// The times of the members that relaxed, in length⁴, cell by cell.
     pub cells: Vec<CellValues>,
     /// The members without t_relax, counted by their status.
@@ -45,25 +39,25 @@ pub struct RelaxationTimes<'a> {
 impl RelaxationTimes<'_> {
     /// The text of an SVG file.
     pub fn draw(self, medium: Medium) -> String {
-        let RelaxationTimes { title, note, quantity, key, mut cells, others, median } = self;
+        let RelaxationTimes { text, mut cells, others, median } = self;
         let members = cells.iter().map(|cell| cell.members).sum();
         CellValues::sort(&mut cells);
         let relaxed = cells.iter().map(|cell| cell.numbers.len() as u64).sum();
-        let values: Vec<Option<f64>> = cells.iter().map(|cell| cell.value).collect();
-        let colours = Colours::of(&values, &key);
-        let sentences = vec![counts(quantity, relaxed, members, others), note.into(), colours.sentence(cells.len())];
+        let colours = Colours::of(cells.len(), &text.key);
+        let mut heading = text.heading([colours.sentence(cells.len())]);
+        heading.sentences.insert(0, counts(&text.quantity, relaxed, members, others));
         if relaxed == 0 {
-            return nothing(medium, title, sentences, "No member relaxed, so there are no relaxation times to count.");
+            return heading.nothing(medium, "No member relaxed, so there are no relaxation times to count.");
         }
         let median = median.filter(|median| Scale::Linear.holds(median.value));
-        let named = colours.legend(|i| &cells[i].label).filter(|_| cells.len() > 1);
+        let named = colours.legend().into_iter().filter(|_| cells.len() > 1);
         let middle = median.iter().map(|median| Entry::new("ink", LegendMark::Dashed, &label(median)));
-        let heading = Heading { title, sentences, legend: named.chain(middle).collect() };
+        heading.legend = named.chain(middle).collect();
         let (mut svg, top) = heading.begin(medium, HISTOGRAM + GAP + SHARE + FOOT + 8.0);
 
         let scale = CellValues::scale(&cells);
         let bins = Bins::shared(&cells, scale);
-        let across = bins[0].axis(quantity, TIME, scale);
+        let across = bins[0].axis(&text.quantity, TIME, scale);
         let counted = Axis::counts("members", bins.iter().map(Bins::most).max().unwrap_or(0));
         let share = Axis::new("share relaxed", "", Scale::Linear, (0.0, 1.05));
         let left = Panel::left(&counted, HISTOGRAM).max(Panel::left(&share, SHARE));

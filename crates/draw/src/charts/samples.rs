@@ -27,11 +27,11 @@ fn times(count: usize, median: f64, width: f64) -> Vec<f64> {
 }
 
 /// A Kaplan-Meier curve of members censored at `end`; some are censored earlier.
-pub fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end: f64) -> SurvivalCurve {
+pub fn survival(count: usize, median: f64, end: f64) -> SurvivalCurve {
     let mut all: Vec<(f64, bool)> =
         times(count, median, 0.5).into_iter().enumerate().map(|(i, t)| (t.min(end), t < end && i % 17 != 3)).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut curve = SurvivalCurve { label: label.into(), value, ..SurvivalCurve::default() };
+    let mut curve = SurvivalCurve::default();
     let (mut share, mut low, mut high) = (1.0, vec![], vec![]);
     for (i, (t, relaxed)) in all.iter().enumerate() {
         if *relaxed {
@@ -50,11 +50,11 @@ pub fn survival(label: &str, value: Option<f64>, count: usize, median: f64, end:
 }
 
 /// The mean excess of a cell that decays at this rate after a faster start, at `count` times up to 1.5.
-pub fn decay(label: &str, value: Option<f64>, rate: f64, count: usize) -> DecayCurve {
+pub fn decay(rate: f64, count: usize) -> DecayCurve {
     let t: Vec<f64> = (0..count).map(|i| 1.5 * i as f64 / (count - 1) as f64).collect();
     let mean: Vec<f64> = t.iter().map(|t| 0.07 * (-rate * t).exp() + 0.03 * (-9.0 * rate * t).exp()).collect();
     let band = (mean.iter().map(|e| 0.6 * e).collect(), mean.iter().map(|e| 1.5 * e).collect());
-    DecayCurve { label: label.into(), value, t, mean, band: Some(band) }
+    DecayCurve { t, mean, band: Some(band) }
 }
 
 fn level(at: Setting, median: f64) -> DependencePoint {
@@ -63,16 +63,28 @@ fn level(at: Setting, median: f64) -> DependencePoint {
 }
 
 /// Medians scattered about factor·amplitude^(−0.31), at `count` amplitudes from 0.01.
-pub fn amplitudes(label: &str, factor: f64, count: usize) -> Series {
+pub fn amplitudes(factor: f64, count: usize) -> Series {
     let amplitude = |i: usize| 0.01 * 1.6_f64.powi(i as i32);
     let law = |x: f64| factor * x.powf(-0.31);
     let levels = (0..count).map(|i| level(Setting::Number(amplitude(i)), law(amplitude(i)) * (1.0 + 0.05 * normal(i))));
     let exponent = EstimatedNumber { value: -0.312, interval: Some(Interval::between(-0.33, -0.294)) };
     let fit = Some(PowerLawLine { exponent, factor, rejected: false });
-    Series { label: label.into(), value: Some(factor), levels: levels.collect(), fit }
+    Series { levels: levels.collect(), fit }
 }
 
 const NOTE: &str = "ellipse:2,1, surface-diffusion, n = 100, adaptive 0.0001, t-end = 2, seed 1";
+
+/// A title above the note, with the key.
+fn text(title: &str, quantity: &str, key: CellKey) -> ChartText {
+    ChartText { title: title.into(), note: NOTE.into(), quantity: quantity.into(), key }
+}
+
+/// Cells that differ in the amplitude, with the label and the value of each.
+fn key(cells: impl Iterator<Item = (String, f64)>) -> CellKey {
+    let (labels, values): (Vec<String>, Vec<f64>) =
+        cells.map(|(shown, value)| (format!("amplitude = {shown}"), value)).unzip();
+    CellKey { names: labels.clone(), labels, values: Some(values), .."amplitude".into() }
+}
 
 /// Every chart with data of every kind, and its name; drawn once.
 pub fn pictures() -> &'static [(String, String)] {
@@ -91,9 +103,9 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         let median = median
             .map(|value| EstimatedNumber { value, interval: Some(Interval::between(0.97 * value, 1.04 * value)) });
         let members = times.len() as u64 + others.iter().map(|(_, count)| count).sum::<u64>();
-        let cells = vec![CellValues { numbers: times.to_vec(), members, ..CellValues::default() }];
-        let (title, quantity, key) = ("Relaxation times", "t_relax", CellKey::default());
-        RelaxationTimes { title, note: NOTE, quantity, key, cells, others, median }.draw(medium)
+        let cells = vec![CellValues { numbers: times.to_vec(), members }];
+        let text = text("Relaxation times", "t_relax", CellKey::default());
+        RelaxationTimes { text, cells, others, median }.draw(medium)
     };
     add("relaxation", relaxation(&times(412, 0.4, 0.2), &some, Some(0.42)));
     add("relaxation-wide", relaxation(&times(5000, 1e-6, 1.5), &[], Some(1e-6)));
@@ -106,9 +118,9 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("relaxation-million", relaxation(&times(1_000_000, 0.4, 0.3), &some, Some(0.4)));
 
     let rates = |rates: &[f64], relative: bool, without: u64| {
-        let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64, ..CellValues::default() }];
-        let (title, key, unit) = ("Rates of decay", CellKey::default(), "length⁻⁴");
-        FittedRates { title, note: NOTE, key, cells, relative, unit, without }.draw(medium)
+        let cells = vec![CellValues { numbers: rates.to_vec(), members: rates.len() as u64 }];
+        let (text, unit) = (text("Rates of decay", "", CellKey::default()), "length⁻⁴");
+        FittedRates { text, cells, relative, unit, without }.draw(medium)
     };
     add("rates", rates(&times(412, 1.0, 0.01), true, 3));
     add("rates-absolute", rates(&times(412, 24.0, 0.5), false, 0));
@@ -119,54 +131,32 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("rates-million", rates(&times(1_000_000, 1.0, 0.3), true, 1));
 
     let by_cell = |count: usize, members: usize| -> Vec<CellValues> {
-        let cell = |i: usize| CellValues {
-            label: format!("amplitude = {i}"),
-            value: Some(i as f64),
-            numbers: times(members, 1.0 + 0.1 * i as f64, 0.1),
-            members: members as u64 + 7,
-        };
+        let cell =
+            |i: usize| CellValues { numbers: times(members, 1.0 + 0.1 * i as f64, 0.1), members: members as u64 + 7 };
         (0..count).map(cell).collect()
     };
     for (count, members) in [(2, 512), (8, 256), (20, 100), (300, 1000)] {
-        let (note, cells) = (NOTE, by_cell(count, members));
-        let key = || CellKey::from("amplitude");
-        let others = [("unfinished", 7 * count as u64)];
-        let title = "Relaxation times";
-        let svg = RelaxationTimes {
-            title,
-            note,
-            quantity: "t_relax",
-            key: key(),
-            cells: cells.clone(),
-            others: &others,
-            median: None,
-        }
-        .draw(medium);
-        add(&format!("relaxation-cells-{count}"), svg);
-        let (title, unit) = ("Rates of decay", "length⁻⁴");
-        let svg = FittedRates { title, note, key: key(), cells, relative: true, unit, without: 7 * count as u64 }
-            .draw(medium);
-        add(&format!("rates-cells-{count}"), svg);
+        let (cells, without) = (by_cell(count, members), 7 * count as u64);
+        let text = |title: &str| text(title, "t_relax", key((0..count).map(|i| (i.to_string(), i as f64))));
+        let others = &[("unfinished", without)];
+        let times = text("Relaxation times");
+        let times = RelaxationTimes { text: times, cells: cells.clone(), others, median: None };
+        add(&format!("relaxation-cells-{count}"), times.draw(medium));
+        let rates = text("Rates of decay");
+        let rates = FittedRates { text: rates, cells, relative: true, unit: "length⁻⁴", without };
+        add(&format!("rates-cells-{count}"), rates.draw(medium));
     }
 
-    let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
-        Survival {
-            title: "Share that has not relaxed",
-            note: NOTE,
-            key: "amplitude".into(),
-            curves,
-            time,
-            ..Survival::default()
-        }
-        .draw(medium)
-    };
     let amplitude = |i: usize| 0.01 * 1.3_f64.powi(i as i32);
+    let growing =
+        |cells: usize| key((0..40).cycle().take(cells).map(|i| (format!("{:.3}", amplitude(i)), amplitude(i))));
+    let share = |key: CellKey| text("Share that has not relaxed", "t", key);
+    let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
+        let text = share(growing(curves.len()));
+        Survival { text, curves, time, ..Survival::default() }.draw(medium)
+    };
     let cells = |cells: usize, count: usize| -> Vec<SurvivalCurve> {
-        let cell = |i: usize| {
-            let a = amplitude(i);
-            survival(&format!("amplitude = {a:.3}"), Some(a), count, 0.3 + 0.1 * i as f64, 1.4)
-        };
-        (0..cells).map(cell).collect()
+        (0..cells).map(|i| survival(count, 0.3 + 0.1 * i as f64, 1.4)).collect()
     };
     add("survival-1", survive(cells(1, 256), None));
     add("survival-3", survive(cells(3, 512), None));
@@ -177,7 +167,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("survival-log", survive(cells(3, 200), Some(Scale::Log)));
     add("survival-none", survive(vec![], None));
     add("survival-empty", survive(vec![SurvivalCurve::default(); 12], None));
-    let alone = SurvivalCurve { label: "all".into(), t: vec![0.4], survival: vec![0.0], ..SurvivalCurve::default() };
+    let alone = SurvivalCurve { t: vec![0.4], survival: vec![0.0], ..SurvivalCurve::default() };
     add("survival-one", survive(vec![alone.clone()], None));
     add("survival-censored", survive(vec![SurvivalCurve { t: vec![], censored: vec![2.0; 9], ..alone.clone() }], None));
     let (t, survival) = (unknown.to_vec(), unknown.to_vec());
@@ -189,27 +179,15 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     let algebraic = Theory { label: "(1 + 2t/R₀⁴)⁻⁴".into(), law: algebraic };
     let fall = |curves: Vec<DecayCurve>, time: Option<Scale>| {
         let theory = if time == Some(Scale::Log) { &algebraic } else { &theory };
-        let theory = vec![theory.clone()];
-        Decay {
-            title: "Mean excess in time",
-            note: NOTE,
-            band: "5 to 95 % of the members",
-            key: "amplitude".into(),
-            curves,
-            theory,
-            time,
-        }
-        .draw(medium)
+        let (text, theory) = (text("Mean excess in time", "", growing(curves.len())), vec![theory.clone()]);
+        Decay { text, band: "5 to 95 % of the members", curves, theory, time }.draw(medium)
     };
-    let falls = |cells: usize, count: usize| -> Vec<DecayCurve> {
-        let cell =
-            |i: usize| decay(&format!("amplitude = {:.3}", amplitude(i)), Some(amplitude(i)), 6.0 + i as f64, count);
-        (0..cells).map(cell).collect()
-    };
+    let falls =
+        |cells: usize, count: usize| -> Vec<DecayCurve> { (0..cells).map(|i| decay(6.0 + i as f64, count)).collect() };
     add("decay-1", fall(falls(1, 60), None));
     add("decay-3", fall(falls(3, 200), None));
     add("decay-30", fall(falls(30, 5000), None));
-    add("decay-long", fall(vec![decay("all", None, 60.0, 500)], None));
+    add("decay-long", fall(vec![decay(60.0, 500)], None));
     add("decay-log", fall(falls(2, 400), Some(Scale::Log)));
     add("decay-million", fall(falls(4, 250_000), None));
     add("decay-none", fall(vec![], None));
@@ -219,62 +197,45 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("decay-equal", fall(vec![DecayCurve { mean: vec![0.1; 2], ..zero }], None));
     let unknowns = unknown.to_vec();
     let band = Some((unknowns.clone(), unknowns.clone()));
-    add(
-        "decay-unknown",
-        fall(vec![DecayCurve { t: unknowns.clone(), mean: unknowns, band, ..DecayCurve::default() }], None),
-    );
+    add("decay-unknown", fall(vec![DecayCurve { t: unknowns.clone(), mean: unknowns, band }], None));
 
-    let depend = |series: Vec<Series>, key: &str| {
-        let title = "Relaxation time against amplitude";
-        Dependence {
-            title,
-            note: NOTE,
-            quantity: "t_relax",
-            key,
-            other_key: "aspect".into(),
-            series,
-            across: None,
-            time: None,
-        }
-        .draw(medium)
+    let depend_on = |labels: Vec<String>, values: Option<Vec<f64>>, series: Vec<Series>, key: &str| {
+        let other = CellKey { labels, values, ..CellKey::from("aspect") };
+        let text = text("Relaxation time against amplitude", "t_relax", other);
+        Dependence { text, key, series, across: None, time: None }.draw(medium)
     };
-    add("dependence", depend(vec![amplitudes("all", 0.12, 8)], "amplitude"));
-    let mut partial = amplitudes("all", 0.12, 8);
+    let depend = |series: Vec<Series>, key: &str| depend_on(vec!["all".into()], None, series, key);
+    add("dependence", depend(vec![amplitudes(0.12, 8)], "amplitude"));
+    let mut partial = amplitudes(0.12, 8);
     partial.fit = None;
     partial.levels[0].median = None;
     partial.levels[0].quartiles.1 = None;
     partial.levels[1].quartiles.1 = None;
-    let linear = Dependence {
-        title: "Linear axes",
-        quantity: "t_relax",
-        key: "amplitude",
-        series: vec![partial],
-        ..Dependence::default()
-    };
+    let unsaid = ChartText { note: String::new(), ..text("Linear axes", "t_relax", CellKey::default()) };
+    let linear = Dependence { text: unsaid, key: "amplitude", series: vec![partial], ..Dependence::default() };
     add("dependence-partial", linear.draw(medium));
-    let series = |count: usize| -> Vec<Series> {
-        (0..count).map(|i| amplitudes(&format!("aspect = {}", i + 1), 0.1 * 1.3_f64.powi(i as i32), 6)).collect()
-    };
-    add("dependence-3", depend(series(3), "amplitude"));
-    add("dependence-8", depend(series(8), "amplitude"));
-    add("dependence-12", depend(series(12), "amplitude"));
+    for count in [3, 8, 12] {
+        let labels = (1..=count).map(|aspect| format!("aspect = {aspect}")).collect();
+        let factors: Vec<f64> = (0..count).map(|i| 0.1 * 1.3_f64.powi(i)).collect();
+        let series = factors.iter().map(|factor| amplitudes(*factor, 6)).collect();
+        add(&format!("dependence-{count}"), depend_on(labels, Some(factors), series, "amplitude"));
+    }
     let named = |names: &[&str], factor: f64| -> Series {
         let levels = names.iter().enumerate();
         let levels = levels.map(|(i, name)| level(Setting::Name((*name).into()), factor * (1.0 + 0.4 * i as f64)));
-        Series { label: format!("λ = {factor}"), value: None, levels: levels.collect(), fit: None }
+        Series { levels: levels.collect(), fit: None }
     };
     let flows = ["surface-diffusion", "willmore", "elastic:0.5", "poly:0.1,0.25,0.333333333,0.1,0.0001,12345"];
     add("dependence-named", depend(vec![named(&flows, 0.3)], "flow"));
-    add("dependence-named-3", depend([0.1, 0.2, 0.4].map(|factor| named(&flows, factor)).into(), "flow"));
+    let factors = [0.1, 0.2, 0.4];
+    let (labels, series) = (factors.map(|factor| format!("λ = {factor}")), factors.map(|factor| named(&flows, factor)));
+    add("dependence-named-3", depend_on(labels.into(), None, series.into(), "flow"));
     let names: Vec<String> = (0..60).map(|i| format!("file:island-{i}.csv")).collect();
     add("dependence-names", depend(vec![named(&names.iter().map(String::as_str).collect::<Vec<_>>(), 0.3)], "shape"));
     add("dependence-none", depend(vec![], "amplitude"));
-    add("dependence-one", depend(vec![amplitudes("all", 0.12, 1)], "amplitude"));
+    add("dependence-one", depend(vec![amplitudes(0.12, 1)], "amplitude"));
     let level = DependencePoint { at: Setting::Number(f64::NAN), median: None, quartiles: (None, None) };
-    add(
-        "dependence-unreached",
-        depend(vec![Series { levels: vec![level.clone(); 3], ..Series::default() }], "amplitude"),
-    );
+    add("dependence-unreached", depend(vec![Series { levels: vec![level.clone(); 3], fit: None }], "amplitude"));
     let median = Some(EstimatedNumber { value: 0.4, interval: Some(Interval::between(f64::NAN, f64::INFINITY)) });
     let (at, fit) = (
         Setting::Number(0.0),
@@ -285,7 +246,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         }),
     );
     let levels = vec![DependencePoint { at, median, quartiles: (Some(f64::NAN), None) }, level];
-    add("dependence-unknown", depend(vec![Series { levels, fit, ..Series::default() }], "amplitude"));
+    add("dependence-unknown", depend(vec![Series { levels, fit }], "amplitude"));
 
     let mesh = |mesh_ratio: &[f64], metric_drift: &[f64]| {
         let [mesh_ratio, metric_drift] =
@@ -303,6 +264,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("mesh-equal", mesh(&[1.0; 100], &[1e-3; 100]));
     add("mesh-unknown", mesh(&unknown, &unknown));
 
+    let tenths = |cells: usize| key((0..cells).map(|i| (format!("0.{i}"), 0.1 * i as f64)));
     let scatter = |count: usize, cells: usize, panels: usize| {
         let point = |i: usize, panel: usize| {
             let x = 0.05 * normal(i);
@@ -314,10 +276,9 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
             heading: "R² 0.923, Spearman −0.930".into(),
             points: (0..count).map(|i| point(i, panel)).collect(),
         };
-        let cells = (0..cells).map(|i| (format!("amplitude = 0.{i}"), Some(0.1 * i as f64))).collect();
-        let (title, notes) = ("What explains the relaxation time", vec![NOTE.into()]);
-        let (key, panels, reason) = ("amplitude".into(), (0..panels).map(panel).collect(), "Nothing is claimed.");
-        Scatter { title, notes, quantity: "t_relax", key, cells, panels, reason }
+        let text = text("What explains the relaxation time", "t_relax", tenths(cells));
+        let panels = (0..panels).map(panel).collect();
+        Scatter { text, notes: Vec::new(), cells, panels, reason: "Nothing is claimed." }
     };
     add("scatter", scatter(256, 1, 4).draw(medium));
     add("scatter-cells-3", scatter(250, 3, 4).draw(medium));
@@ -334,14 +295,12 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
             let at = |z: f64| 0.8 * (0.1 * i as f64 + (0.1 + 0.02 * i as f64) * z).exp();
             let place = |(share, z): (f64, f64)| (share <= known).then(|| at(z));
             CellQuantiles {
-                label: format!("amplitude = 0.{i}"),
-                value: Some(0.1 * i as f64),
                 places: [(0.05, -1.645), (0.25, -0.674), (0.5, 0.0), (0.75, 0.674), (0.95, 1.645)].map(place),
                 quantiles: (1..50).map(|j| f64::from(j) * 0.1 - 2.5).map(|z| (z, at(z))).collect(),
             }
         };
-        let (title, cells) = ("Distribution of the relaxation times", (0..count).map(cell).collect());
-        TimeDistribution { title, note: NOTE, quantity: "t_relax", key: "amplitude".into(), keys: "amplitude", cells }
+        let text = text("Distribution of the relaxation times", "t_relax", tenths(count));
+        TimeDistribution { text, keys: "amplitude", cells: (0..count).map(cell).collect() }
     };
     add("distribution", quantiles(1, 1.0).draw(medium));
     add("distribution-cells-5", quantiles(5, 1.0).draw(medium));
@@ -358,29 +317,24 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         Crossed { colours, patterns, places: (0..6).map(|i| (i / 2, i % 2)).collect() }
     };
     for (name, named_elsewhere) in [("crossed", false), ("crossed-told", true)] {
-        let key =
-            || CellKey { name: "amplitude".into(), crossed: Some(crossed()), named_elsewhere, ..CellKey::default() };
+        let key = |own: CellKey| CellKey { crossed: Some(crossed()), named_elsewhere, ..own };
         let mut boxes = quantiles(6, 1.0);
-        boxes.key = key();
+        boxes.text.key = key(tenths(6));
         add(&format!("distribution-{name}"), boxes.draw(medium));
         let mut dots = scatter(250, 6, 2);
-        dots.key = key();
+        dots.text.key = key(tenths(6));
         add(&format!("scatter-{name}"), dots.draw(medium));
-        let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(6, 100));
-        add(
-            &format!("survival-{name}"),
-            Survival { title, note, key: key(), curves, ..Survival::default() }.draw(medium),
-        );
+        let (text, curves) = (share(key(growing(6))), cells(6, 100));
+        add(&format!("survival-{name}"), Survival { text, curves, ..Survival::default() }.draw(medium));
     }
     let wide = Crossed { colours: (0..12).map(|i| i.to_string()).collect(), ..crossed() };
     let wide = Crossed { places: (0..24).map(|i| (i / 2, i % 2)).collect(), ..wide };
-    let key = CellKey { name: "amplitude".into(), crossed: Some(wide), ..CellKey::default() };
-    let (title, note, curves) = ("Share that has not relaxed", NOTE, cells(24, 100));
-    add("survival-crossed-24", Survival { title, note, key, curves, ..Survival::default() }.draw(medium));
+    let (text, curves) = (share(CellKey { crossed: Some(wide), ..growing(24) }), cells(24, 100));
+    add("survival-crossed-24", Survival { text, curves, ..Survival::default() }.draw(medium));
 
     let few = |members: Vec<MemberDot>| {
-        let (title, note, quantity, names) = ("Relaxation times", NOTE, "t_limit", "outline");
-        MemberTimes { title, note, quantity, names, members }.draw(medium)
+        let text = self::text("Relaxation times", "t_limit", CellKey::default());
+        MemberTimes { text, names: "outline", members }.draw(medium)
     };
     let dot =
         |name: &str, t: f64, error: Option<f64>, happened: bool| MemberDot { name: name.into(), t, error, happened };
@@ -416,20 +370,9 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
 
     let hostile =
         "<script>alert(\"a & b\")</script> and a title that is so long that it has to be broken into lines \0";
-    let curves = vec![SurvivalCurve { label: hostile.into(), ..cells(1, 20).remove(0) }; 2];
-    add(
-        "hostile",
-        Survival {
-            title: hostile,
-            note: hostile,
-            quantity: hostile,
-            key: hostile.into(),
-            share: hostile,
-            none: hostile,
-            curves,
-            time: None,
-        }
-        .draw(medium),
-    );
+    let key = CellKey { labels: vec![hostile.into(); 2], ..hostile.into() };
+    let text = ChartText { note: hostile.into(), ..self::text(hostile, hostile, key) };
+    let curves = vec![cells(1, 20).remove(0); 2];
+    add("hostile", Survival { text, share: hostile, none: hostile, curves, time: None }.draw(medium));
     pictures
 }

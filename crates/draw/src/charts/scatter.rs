@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, HEADING, Heading, LegendMark, Panel, drawable, nothing, triangle_up},
+    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, Panel, drawable, triangle_up},
     medium::Medium,
     svg::{Svg, dots},
     width::{SIZE, shortened},
@@ -20,16 +20,12 @@ const GAP: f64 = 14.0;
 /// A time against features.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scatter<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// Sentences below it.
+    /// What is said of it.
+    pub text: ChartText,
+    /// Sentences below the note.
     pub notes: Vec<String>,
-    /// The time.
-    pub quantity: &'a str,
-    /// What distinguishes the cells.
-    pub key: CellKey,
-    /// The cells, each with its entry in the legend and its value, if it has one.
-    pub cells: Vec<(String, Option<f64>)>,
+    /// Number of cells.
+    pub cells: usize,
     /// The features, best first.
     pub panels: Vec<ScatterPanel>,
     /// Why there are none.
@@ -80,23 +76,22 @@ impl ScatterPoint {
 impl Scatter<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let mut sentences = self.notes.clone();
+        let mut heading = self.text.heading(self.notes.iter().cloned());
         if self.panels.is_empty() {
-            return nothing(medium, self.title, sentences, self.reason);
+            return heading.nothing(medium, self.reason);
         }
-        let values: Vec<Option<f64>> = self.cells.iter().map(|(_, value)| *value).collect();
-        let colours = Colours::of(&values, &self.key);
-        sentences.push(colours.sentence(self.cells.len()));
+        let colours = Colours::of(self.cells, &self.text.key);
+        heading.sentences.push(colours.sentence(self.cells));
         let hidden = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| !point.is_drawable()).count();
         if hidden > 0 {
-            sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
+            heading.sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
         }
         let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, colours.room(HEIGHT));
-        let heading = Heading { title: self.title, sentences, legend: self.legend(&colours) };
+        heading.legend = self.legend(&colours);
         let (mut svg, top) = heading.begin(medium, places.height(self.panels.len()));
         let times = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| point.is_drawable());
         let scale = Scale::of(times.clone().map(|point| point.t));
-        let time = Axis::over(self.quantity, TIME, scale, times.map(|point| point.t));
+        let time = Axis::over(&self.text.quantity, TIME, scale, times.map(|point| point.t));
         let left = Panel::left(&time, HEIGHT);
         for (i, of) in self.panels.iter().enumerate() {
             let known = of.points.iter().filter(|point| point.is_drawable());
@@ -131,22 +126,19 @@ impl Scatter<'_> {
     }
 
     fn legend(&self, colours: &Colours) -> Vec<Entry> {
-        let several = self.cells.len() > 1 && colours.bar.is_none();
+        let (key, several) = (&self.text.key, self.cells > 1 && colours.bar.is_none());
         // Panels show what colours do not.
-        let cells: Vec<Entry> = match &self.key.crossed {
-            _ if !several || colours.named_elsewhere() => Vec::new(),
+        let cells: Vec<Entry> = match &key.crossed {
+            _ if !several || key.named_elsewhere => Vec::new(),
             Some(crossed) => {
                 let entry = |(i, label): (usize, &String)| Entry::new(&format!("s{i}"), LegendMark::Points, label);
                 crossed.colours.iter().enumerate().map(entry).collect()
             }
-            None => {
-                let entry = |(i, class): &(usize, String)| Entry::new(class, LegendMark::Points, &self.cells[*i].0);
-                colours.shown.iter().map(entry).collect()
-            }
+            None => colours.distinct(LegendMark::Points),
         };
         let censored = self.panels.iter().any(|panel| panel.points.iter().any(|point| !point.happened));
         let class = if several { "faint" } else { "s0" };
-        let text = format!("ended without {}, at its last time", self.quantity);
+        let text = format!("ended without {}, at its last time", self.text.quantity);
         let censored = censored.then(|| Entry::new(class, LegendMark::HollowUp, &text));
         cells.into_iter().chain(censored).collect()
     }

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{MAX_BANDS, TIME, only_panel};
 use crate::{
     axis::{Axis, Scale},
-    chart::{CellKey, Colours, Entry, FOOT, Heading, LegendMark, Panel, nothing, stroke},
+    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel, stroke},
     medium::Medium,
     trace,
 };
@@ -23,14 +23,8 @@ const STROKE_GAP: f64 = 3.0;
 /// Survival curves of the cells of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survival<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
-    /// The time.
-    pub quantity: &'a str,
-    /// What distinguishes the cells.
-    pub key: CellKey,
+    /// What is said of it.
+    pub text: ChartText,
     /// What the height of a curve is.
     pub share: &'a str,
     /// The sentence in the place of the curves if there are none.
@@ -45,18 +39,13 @@ pub struct Survival<'a> {
 impl Default for Survival<'_> {
     fn default() -> Self {
         let (share, none) = ("share not relaxed", "There are no members, so there is nothing to survive.");
-        let (key, curves) = (CellKey::default(), Vec::new());
-        Survival { title: "", note: "", quantity: "t", key, share, none, curves, time: None }
+        Survival { text: ChartText::default(), share, none, curves: Vec::new(), time: None }
     }
 }
 
 /// The survival curve of one cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SurvivalCurve {
-    /// Its entry in the legend.
-    pub label: String,
-    /// The value of a numeric key, for the colour bar.
-    pub value: Option<f64>,
     /// Times at which members relaxed, ascending, in length⁴.
     pub t: Vec<f64>,
     /// Fraction that has not relaxed after each of those times, in [0, 1].
@@ -143,21 +132,20 @@ impl SurvivalCurve {
 impl Survival<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let Survival { title, note, curves, .. } = self;
-        let values: Vec<Option<f64>> = curves.iter().map(|curve| curve.value).collect();
-        let colours = Colours::of(&values, &self.key);
-        let sentences = vec![(*note).into(), colours.sentence(curves.len())];
+        let Survival { text, curves, .. } = self;
+        let colours = Colours::of(curves.len(), &text.key);
+        let mut heading = text.heading([colours.sentence(curves.len())]);
         if curves.iter().all(|curve| curve.end(Scale::Linear).is_none()) {
-            return nothing(medium, title, sentences, self.none);
+            return heading.nothing(medium, self.none);
         }
         let (bands, censored) = (self.has_bands(), self.has_strokes());
-        let heading = Heading { title, sentences, legend: self.legend(&colours, bands, censored) };
+        heading.legend = self.legend(&colours, bands, censored);
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
         let times = || curves.iter().flat_map(SurvivalCurve::times);
         let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles)));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
-        let across = Axis::over(self.quantity, TIME, scale, times()).with_zero();
+        let across = Axis::over(&text.quantity, TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
         let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);
@@ -190,10 +178,9 @@ impl Survival<'_> {
     }
 
     fn legend(&self, colours: &Colours, bands: bool, censored: bool) -> Vec<Entry> {
-        let curves = colours.legend(|i| &self.curves[i].label);
         let band = bands.then(|| Entry::new("faint", LegendMark::Band, "95 % band"));
         let stroke = censored.then(|| Entry::new("faint", LegendMark::Stroke, "censored"));
-        curves.chain(band).chain(stroke).collect()
+        colours.legend().into_iter().chain(band).chain(stroke).collect()
     }
 }
 

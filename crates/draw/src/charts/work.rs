@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable, nothing},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable},
     medium::Medium,
     trace,
 };
@@ -53,16 +53,16 @@ impl WorkDiagram<'_> {
         };
         let curves = || rows.iter().flat_map(|row| &row.curves);
         let all = |column: usize| curves().flat_map(move |curve| shown(&curve.points, column));
+        let mut heading = Heading { title, sentences: vec![(*note).into()], legend: Vec::new() };
         if all(0).next().is_none() {
-            return nothing(medium, title, vec![(*note).into()], "No run gave an error.");
+            return heading.nothing(medium, "No run gave an error.");
         }
         let entry = |(rank, curve): (usize, &WorkCurve)| {
             Entry::new(&format!("s{rank}"), LegendMark::Marker(rank), &curve.label)
         };
         let longest = rows.iter().max_by_key(|row| row.curves.len());
-        let legend = longest.into_iter().flat_map(|row| row.curves.iter().enumerate().map(entry)).collect();
+        heading.legend = longest.into_iter().flat_map(|row| row.curves.iter().enumerate().map(entry)).collect();
         let row_height = HEADING + HEIGHT + FOOT;
-        let heading = Heading { title, sentences: vec![(*note).into()], legend };
         let (mut svg, top) = heading.begin(medium, rows.len() as f64 * row_height);
         let errors = Axis::over("error of t_relax", "", Scale::Log, all(0).map(|(_, error)| error));
         let across = [0, 1].map(|column| {

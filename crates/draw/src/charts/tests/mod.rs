@@ -147,7 +147,7 @@ fn near(a: f64, b: f64) -> bool {
 fn medians_are_where_the_ticks_say() {
     let svg = picture("dependence");
     let (x, y) = (scale(svg, "x", true), scale(svg, "y", true));
-    let series = amplitudes("all", 0.12, 8);
+    let series = amplitudes(0.12, 8);
     // The first of each kind belongs to the legend.
     let dots = &paths(svg, "dots")[1..];
     assert_eq!(dots.len(), series.levels.len());
@@ -181,7 +181,7 @@ fn members_are_where_the_ticks_say_and_tell_their_numbers() {
 fn survival_falls_to_what_is_left() {
     let svg = picture("survival-1");
     let (x, y) = (scale(svg, "x", false), scale(svg, "y", false));
-    let curve = survival("", None, 256, 0.3, 1.4);
+    let curve = survival(256, 0.3, 1.4);
     let end = curve.t.iter().chain(&curve.censored).copied().fold(0.0, f64::max);
     let line = &paths(svg, "series")[1];
     let (first, last) = (line[0], line[line.len() - 1]);
@@ -239,7 +239,7 @@ fn the_mean_excess_and_its_theory_fall_as_they_should() {
     let close = |a: f64, b: f64| (a / b - 1.0).abs() < 0.01;
     let line = &paths(svg, "series")[1];
     let [t, excess] = line[line.len() - 1];
-    let curve = decay("", None, 6.0, 60);
+    let curve = decay(6.0, 60);
     assert!(near(x(t), 1.5) && close(y(excess), curve.mean[59]), "{} {}", x(t), y(excess));
     for [t, excess] in &paths(svg, "dashed")[1] {
         assert!(close(y(*excess), 0.06 * (-6.0 * x(*t)).exp()), "{} {}", x(*t), y(*excess));

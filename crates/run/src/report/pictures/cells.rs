@@ -51,7 +51,7 @@ impl FinishedRun<'_> {
     }
 
     /// Its values, cell by cell.
-    pub(super) fn numbers(&self) -> Option<Vec<f64>> {
+    fn numbers(&self) -> Option<Vec<f64>> {
         let (place, _) = self.colour_axis()?;
         let cells = self.statistics.cells.iter();
         cells.map(|cell| cell.values.get(place)?.parse().ok()).collect()
@@ -79,8 +79,15 @@ impl FinishedRun<'_> {
     /// What distinguishes the cells in a chart; `on_page` if a page may have a legend of them.
     pub(super) fn cell_key(&self, on_page: bool) -> CellKey {
         let name = self.colour_axis().map_or(self.keys(), |(_, axis)| axis.key.clone());
-        let names = self.statistics.cells.iter().map(|cell| self.short_label(cell.cell)).collect();
-        CellKey { name, crossed: self.crossed(), names, named_elsewhere: on_page && !self.legend().is_empty() }
+        let of_each = |name: &dyn Fn(u64) -> String| self.statistics.cells.iter().map(|cell| name(cell.cell)).collect();
+        CellKey {
+            name,
+            crossed: self.crossed(),
+            labels: of_each(&|cell| self.label(cell)),
+            names: of_each(&|cell| self.short_label(cell)),
+            values: self.numbers(),
+            named_elsewhere: on_page && !self.legend().is_empty(),
+        }
     }
 
     /// The legend of the cells for all charts of a page; empty if there is one cell, or a colour bar.

@@ -5,9 +5,10 @@ use crate::report::{page::spread, words::member_name};
 use curvelax_base::{error::Result, random::normal_quantile, text::significant};
 use curvelax_draw::{
     charts::{
-        CellKey, CellQuantiles, CellValues, Crossed, Decay, DecayCurve, DecayLaw, Dependence, DependencePoint,
-        EstimatedNumber, FittedRates, MemberDot, MemberTimes, MeshQuality, PowerLawLine, RelaxationTimes, Scatter,
-        ScatterPanel, ScatterPoint, Series, Setting, Survival, SurvivalCurve, Theory, TimeDistribution,
+        CellKey, CellQuantiles, CellValues, ChartText, Crossed, Decay, DecayCurve, DecayLaw, Dependence,
+        DependencePoint, EstimatedNumber, FittedRates, MemberDot, MemberTimes, MeshQuality, PowerLawLine,
+        RelaxationTimes, Scatter, ScatterPanel, ScatterPoint, Series, Setting, Survival, SurvivalCurve, Theory,
+        TimeDistribution,
     },
     medium::Medium,
     style::SERIES,
@@ -17,7 +18,7 @@ use curvelax_files::names;
 use curvelax_flow::{crystal::Energy, equilibrium::Equilibrium, flow::Flow};
 use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
 use curvelax_study::results::{
-    cells::{CellStatistics, EnsembleStatistics, GroupStatistics},
+    cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     explained::{Explained, ExplainedRow, FeaturedMember, TOGETHER},
     scaling::Scaling,
     tally::{CellTally, DISTRUSTED_DRIFT, MemberTime},
@@ -59,12 +60,15 @@ impl FinishedRun<'_> {
         Ok(charts)
     }
 
+    /// What is said of a chart: what ran, and `rest`.
+    fn text(&self, medium: Medium, title: &str, rest: &str, key: &CellKey) -> ChartText {
+        let (note, quantity) = (self.note(medium, rest), self.statistics.time().into());
+        ChartText { title: title.into(), note, quantity, key: key.clone() }
+    }
+
     fn relaxation(&self, medium: Medium, key: &CellKey) -> Chart {
         let cells = &self.statistics.cells;
-        let numbers = self.numbers();
-        let times = cells.iter().enumerate().map(|(rank, cell)| CellValues {
-            label: self.label(cell.cell),
-            value: numbers.as_ref().map(|numbers| numbers[rank]),
+        let times = cells.iter().map(|cell| CellValues {
             numbers: happened(&self.statistics.times(cell).sample, true).collect(),
             members: self.statistics.times(cell).sample.len() as u64,
         });
@@ -74,56 +78,41 @@ impl FinishedRun<'_> {
         });
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
-        let (title, quantity) = ("Relaxation times", self.statistics.time());
-        let (note, key, cells) = (&self.note(medium, &self.error()), key.clone(), times.collect());
-        let svg = RelaxationTimes { title, note, quantity, key, cells, others: &others, median }.draw(medium);
+        let text = self.text(medium, "Relaxation times", &self.error(), key);
+        let (title, quantity) = (text.title.clone(), self.statistics.time());
+        let svg = RelaxationTimes { text, cells: times.collect(), others: &others, median }.draw(medium);
         let of_cells = if self.statistics.cells.len() > 1 { " of each cell" } else { "" };
         let caption = format!(
             "Above: how many members{of_cells} relaxed at which {quantity}. Below: the share of them that had relaxed by \
              then."
         );
-        chart(names::RELAXATION, title, &caption, svg)
+        chart(names::RELAXATION, &title, &caption, svg)
     }
 
     /// The times of each cell as a box, and their quantiles against those of two laws.
     fn distribution(&self, medium: Medium, key: &CellKey) -> Chart {
-        let numbers = self.numbers();
-        let cells = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
+        let cells = self.statistics.cells.iter().map(|cell| {
             let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
             let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
             let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
             let quantiles = survival.quantiles(shares());
             CellQuantiles {
-                label: self.short_label(cell.cell),
-                value: numbers.as_ref().map(|numbers| numbers[rank]),
                 places: self.statistics.times(cell).quantiles,
                 quantiles: shares().map(normal_quantile).zip(quantiles).collect(),
             }
         });
-        let title = "Distribution of the relaxation times";
-        let (note, key, keys, cells) = (&self.note(medium, &self.error()), key.clone(), &self.keys(), cells.collect());
-        let svg = TimeDistribution { title, note, quantity: self.statistics.time(), key, keys, cells }.draw(medium);
+        let text = self.text(medium, "Distribution of the relaxation times", &self.error(), key);
+        let chart_of = TimeDistribution { text, keys: &self.keys(), cells: cells.collect() };
         let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below, if known: \
                        quantiles of the times against a normal distribution, left, and of their logarithms, right.";
-        chart(names::DISTRIBUTION, title, caption, svg)
+        chart(names::DISTRIBUTION, &chart_of.text.title, caption, chart_of.draw(medium))
     }
 
     fn survival(&self, medium: Medium, key: &CellKey) -> Chart {
-        let numbers = self.numbers();
-        let curves = self.statistics.cells.iter().enumerate().map(|(rank, cell)| {
-            let value = numbers.as_ref().map(|numbers| numbers[rank]);
-            survival_curve(self.label(cell.cell), value, &self.statistics.times(cell).sample)
-        });
-        let title = "Members not yet relaxed";
-        let survival = Survival {
-            title,
-            note: &self.note(medium, &self.error()),
-            quantity: self.statistics.time(),
-            key: key.clone(),
-            curves: curves.collect(),
-            ..Survival::default()
-        };
-        chart(names::SURVIVAL, title, &survival_caption(&survival, "it relaxed"), survival.draw(medium))
+        let curves = self.statistics.cells.iter().map(|cell| survival_curve(&self.statistics.times(cell).sample));
+        let text = self.text(medium, "Members not yet relaxed", &self.error(), key);
+        let survival = Survival { text, curves: curves.collect(), ..Survival::default() };
+        survival_chart(names::SURVIVAL, &survival, medium)
     }
 
     /// The members not yet relaxed, by group of their outlines.
@@ -135,23 +124,20 @@ impl FinishedRun<'_> {
             groups.sort_by(|one, other| median(one).total_cmp(&median(other)));
             groups = spread(groups.len(), DISTINCT).map(|i| groups[i]).collect();
         }
-        let curve = |GroupStatistics { group, times }: &GroupStatistics| {
-            survival_curve(self.label_in(group, times.cell), None, &self.statistics.times(times).sample)
-        };
-        let curves: Vec<SurvivalCurve> = groups.iter().map(|group| curve(group)).collect();
-        let title = format!("Members not yet relaxed, by {key}");
-        let some = match curves.len() < all.len() {
-            true => format!("{} of {} groups, spread over the order of their medians", curves.len(), all.len()),
-            false => String::new(),
-        };
-        let note = &self.note(medium, &joined([self.error(), some]));
-        if curves.is_empty() {
+        if groups.is_empty() {
             return None;
         }
-        let (quantity, key) = (self.statistics.time(), CellKey::from(key));
-        let survival = Survival { title: &title, note, quantity, key, curves, ..Survival::default() };
-        let caption = survival_caption(&survival, "it relaxed");
-        Some(chart(names::GROUP_SURVIVAL, &title, &caption, survival.draw(medium)))
+        let some = match groups.len() < all.len() {
+            true => format!("{} of {} groups, spread over the order of their medians", groups.len(), all.len()),
+            false => String::new(),
+        };
+        let curves = groups.iter().map(|group| survival_curve(&self.statistics.times(&group.times).sample)).collect();
+        let labels = groups.iter().map(|of| self.label_in(&of.group, of.times.cell)).collect();
+        let title = format!("Members not yet relaxed, by {key}");
+        let key = CellKey { labels, ..CellKey::from(key) };
+        let text = self.text(medium, &title, &joined([self.error(), some]), &key);
+        let survival = Survival { text, curves, ..Survival::default() };
+        Some(survival_chart(names::GROUP_SURVIVAL, &survival, medium))
     }
 
     /// The name of a group or an event of a cell in a legend.
@@ -162,40 +148,40 @@ impl FinishedRun<'_> {
     /// A survival curve for each event of each cell, if there are events.
     fn events(&self, medium: Medium) -> Option<Chart> {
         let spec = self.spec();
-        let curves = self.statistics.cells.iter().flat_map(|cell| {
+        if spec.event.is_empty() {
+            return None;
+        }
+        let events = self.statistics.cells.iter().flat_map(|cell| {
             let events = spec.event.iter().zip(&cell.events).filter(|(_, of)| of.stopped == 0);
-            events.map(|(event, of)| survival_curve(self.label_in(&event.name, cell.cell), None, &of.judged().sample))
+            events.map(|(event, of)| (self.label_in(&event.name, cell.cell), of))
         });
-        let mut curves: Vec<SurvivalCurve> = curves.collect();
-        let all = curves.len();
-        curves.truncate(DISTINCT);
+        let all = events.clone().count();
+        let curve = |(label, of): (String, &EventStatistics)| (label, survival_curve(&of.judged().sample));
+        let (labels, curves) = events.take(DISTINCT).map(curve).unzip();
         let some = if all > DISTINCT { format!("the first {DISTINCT} of {all} curves") } else { String::new() };
         let shown = spec.event.iter().take(MAX_CONDITIONS).map(Event::to_string);
         let mut conditions = shown.collect::<Vec<_>>().join("; ");
         if spec.event.len() > MAX_CONDITIONS {
             conditions += &format!("; {} more", spec.event.len() - MAX_CONDITIONS);
         }
-        let (title, note) = ("Events", self.note(medium, &joined([conditions, some])));
+        let key = CellKey { labels, ..CellKey::from("event") };
+        let quantity = if self.statistics.of_limits { "t, in the limit" } else { "t" };
+        let text = self.text(medium, "Events", &joined([conditions, some]), &key);
+        let text = ChartText { quantity: quantity.into(), ..text };
         let none = match self.tally.members() {
             0 => "There are no members, so there are no events.",
             _ => "No event has statistics, as members were stopped before it when they relaxed.",
         };
-        let share = "share without the event";
-        if spec.event.is_empty() {
-            return None;
-        }
-        let quantity = if self.statistics.of_limits { "t, in the limit" } else { "t" };
-        let survival = Survival { title, note: &note, quantity, key: "event".into(), share, none, curves, time: None };
+        let survival = Survival { text, share: "share without the event", none, curves, time: None };
         let caption = format!(
             "Share of the members in which an event has not happened yet. {}",
             survival_caption(&survival, "that")
         );
-        Some(chart(names::EVENT_SURVIVAL, title, &caption, survival.draw(medium)))
+        Some(chart(names::EVENT_SURVIVAL, &survival.text.title, &caption, survival.draw(medium)))
     }
 
     /// The mean excess, for as long as all members of a cell are running.
     fn excess(&self, medium: Medium, key: &CellKey) -> Result<Option<Chart>> {
-        let numbers = self.numbers();
         let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
             // Rows are sorted by cell.
@@ -205,8 +191,6 @@ impl FinishedRun<'_> {
             let rows: Vec<(f64, f64, [f64; 2])> = rows.collect();
             let bound = |i: usize| rows.iter().map(|(.., bounds)| bounds[i]).collect();
             DecayCurve {
-                label: self.label(rank as u64),
-                value: numbers.as_ref().map(|numbers| numbers[rank]),
                 t: rows.iter().map(|(t, ..)| *t).collect(),
                 mean: rows.iter().map(|(_, mean, _)| *mean).collect(),
                 band: Some((bound(0), bound(1))),
@@ -228,9 +212,8 @@ impl FinishedRun<'_> {
             true => ("Excess", "while the member runs"),
             false => ("Mean excess", "over all members, while all of them run"),
         };
-        let note = self.note(medium, over);
-        let band = "5 to 95 % of the members";
-        let decay = Decay { title, note: &note, band, key: key.clone(), curves, theory, time: None };
+        let (text, band) = (self.text(medium, title, over, key), "5 to 95 % of the members");
+        let decay = Decay { text, band, curves, theory, time: None };
         let excess = match self.spec().sweep.has("energy") {
             true => Equilibrium::Wulff(Energy::default()),
             false => self.spec().typical().flow.equilibrium(),
@@ -243,19 +226,13 @@ impl FinishedRun<'_> {
 
     fn rates(&self, medium: Medium, key: &CellKey) -> Chart {
         let EnsembleStatistics { cells, relative, .. } = self.statistics;
-        let numbers = self.numbers();
-        let rates = cells.iter().enumerate().map(|(rank, cell)| CellValues {
-            label: self.label(cell.cell),
-            value: numbers.as_ref().map(|numbers| numbers[rank]),
-            numbers: cell.rates.drawn.sorted().into(),
-            members: cell.members(),
-        });
-        let rates: Vec<CellValues> = rates.collect();
-        let title = "Rates of decay";
-        let without = self.tally.members() - rates.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
-        let (relative, unit) = (*relative, "length⁻⁴");
-        let (note, key, cells) = (&self.note(medium, ""), key.clone(), rates);
-        let svg = FittedRates { title, note, key, cells, relative, unit, without }.draw(medium);
+        let rates =
+            cells.iter().map(|cell| CellValues { numbers: cell.rates.drawn.sorted().into(), members: cell.members() });
+        let cells: Vec<CellValues> = rates.collect();
+        let without = self.tally.members() - cells.iter().map(|cell| cell.numbers.len() as u64).sum::<u64>();
+        let (title, relative, unit) = ("Rates of decay", *relative, "length⁻⁴");
+        let text = self.text(medium, title, "", key);
+        let svg = FittedRates { text, cells, relative, unit, without }.draw(medium);
         let over = if relative { ", over the rate that linear theory gives the slowest mode" } else { "" };
         let caption = format!(
             "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start{over}."
@@ -293,17 +270,22 @@ impl FinishedRun<'_> {
             median: median(self.statistics.times(cell)),
             quartiles: quartiles(self.statistics.times(cell)),
         };
-        let series = groups.iter().map(|(values, cells)| {
+        let label = |values: &[String]| {
+            let distinct = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
+            distinct.map(|(key, value)| format!("{} = {value}", key.key)).collect::<Vec<_>>().join(", ")
+        };
+        let labels: Vec<String> = groups.iter().map(|(values, _)| label(values)).collect();
+        let values = match keys[..] {
+            [key] => groups.iter().map(|(values, _)| value_of(key, values)).collect(),
+            _ => None,
+        };
+        let series = groups.iter().map(|(_, cells)| {
             let mut levels: Vec<DependencePoint> = cells.iter().map(level).collect();
             if numbers.is_some() {
                 let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
-            let distinct = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
-            let named = distinct.map(|(key, value)| format!("{} = {value}", key.key));
-            let label = named.collect::<Vec<_>>().join(", ");
-            let value = if let [key] = keys[..] { value_of(key, values) } else { None };
-            Series { label, value, levels, fit: self.power_law() }
+            Series { levels, fit: self.power_law() }
         });
         let series: Vec<Series> = series.collect();
         let title = format!("Relaxation time against {}", axis.key);
@@ -311,16 +293,15 @@ impl FinishedRun<'_> {
         // Colours are those of the key across: the series have dashes and markers.
         let crossed = self.two_axes().map(|_| Crossed {
             colours: Vec::new(),
-            patterns: series.iter().map(|series| series.label.clone()).collect(),
+            patterns: labels.clone(),
             places: (0..series.len()).map(|i| (INK, i)).collect(),
         });
-        let other_key = CellKey { name, crossed, ..CellKey::default() };
+        let others = CellKey { name, crossed, labels, values, ..CellKey::default() };
         let left_out = self.statistics.scaling.as_ref().map(Scaling::in_words).filter(|told| !told.is_empty());
         let left_out = left_out.map_or(String::new(), |told| format!("not in the fit: {told}"));
-        let note = self.note(medium, &joined([self.error(), left_out]));
-        let (key, across, time) = (&axis.key[..], None, None);
+        let text = self.text(medium, &title, &joined([self.error(), left_out]), &others);
+        let chart_of = Dependence { text, key: &axis.key, series, across: None, time: None };
         let quantity = self.statistics.time();
-        let chart_of = Dependence { title: &title, note: &note, quantity, key, other_key, series, across, time };
         let each = self.spec().members_per_cell() == 1;
         let caption = match each {
             true => format!("{quantity} of each member."),
@@ -348,9 +329,6 @@ impl FinishedRun<'_> {
     fn features(&self, medium: Medium, key: &CellKey) -> Chart {
         let Explained { rows, features, pictured, drawn, times } = self.explained;
         let quantity = times.first().map_or("t_relax", String::as_str);
-        let numbers = self.numbers();
-        let cells = self.statistics.cells.iter().enumerate();
-        let cells = cells.map(|(rank, cell)| (self.label(cell.cell), numbers.as_ref().map(|numbers| numbers[rank])));
         let (groups, count) = (self.panel_groups(), self.panel_groups().len());
         let panel = |i: usize, group: &CellGroup| {
             let own = |member: &&FeaturedMember| group.cells.contains(&(member.cell as usize));
@@ -405,9 +383,9 @@ impl FinishedRun<'_> {
             _ if groups.iter().all(|group| group.cells.len() > 1) => String::new(),
             silent => format!("{silent} of {} cells have no R²: too few members relaxed.", told.len()),
         };
-        let notes = vec![self.note(medium, ""), some, left_out, silent];
-        let (key, cells, reason) = (key.clone(), cells.collect(), &*reason);
-        let svg = Scatter { title, notes, quantity, key, cells, panels, reason }.draw(medium);
+        let text = ChartText { quantity: quantity.into(), ..self.text(medium, title, "", key) };
+        let (notes, cells) = (vec![some, left_out, silent], self.statistics.cells.len());
+        let svg = Scatter { text, notes, cells, panels, reason: &reason }.draw(medium);
         let caption =
             format!("{quantity} against the features in members.csv that explain most of it by a straight line.");
         chart(names::FEATURES, title, &caption, svg)
@@ -427,7 +405,8 @@ impl FinishedRun<'_> {
         let open = if has(&|member| !member.happened) { " Hollow: the member ended before." } else { "" };
         let (title, quantity) = ("Relaxation times", self.statistics.time());
         let caption = format!("Dot: {quantity} of a member.{bar}{open}");
-        let svg = MemberTimes { title, note: &self.note(medium, ""), quantity, names: "", members }.draw(medium);
+        let text = self.text(medium, title, "", &CellKey::default());
+        let svg = MemberTimes { text, names: "", members }.draw(medium);
         chart(names::MEMBER_TIMES, title, &caption, svg)
     }
 
@@ -452,6 +431,11 @@ fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
 /// The parts that are not empty, as one sentence.
 fn joined(parts: [String; 2]) -> String {
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
+}
+
+/// Survival curves of relaxation times.
+fn survival_chart(name: &'static str, drawn: &Survival, medium: Medium) -> Chart {
+    chart(name, &drawn.text.title, &survival_caption(drawn, "it relaxed"), drawn.draw(medium))
 }
 
 /// What a survival curve is, as far as it is drawn; a stroke is a member that ended before `what`.
@@ -484,8 +468,8 @@ fn first_time(member: &FeaturedMember) -> Option<f64> {
 }
 
 /// The survival curve of some times, with its band.
-fn survival_curve(label: String, value: Option<f64>, sample: &Sample) -> SurvivalCurve {
-    let mut curve = SurvivalCurve { label, value, ..SurvivalCurve::default() };
+fn survival_curve(sample: &Sample) -> SurvivalCurve {
+    let mut curve = SurvivalCurve::default();
     for step in KaplanMeier::new(sample).steps() {
         curve.add_step(step.time, step.survival, step.band());
     }
