@@ -3,10 +3,11 @@
 
 use glam::DVec2;
 
+use super::members_layout::{OWN_SCALES, PanelLayout, draw_bar};
 use curvelax_curve::polygon;
 use curvelax_draw::{
     medium::Medium,
-    svg::{Svg, closed_path, coordinate, dots},
+    svg::{Svg, closed_path, dots},
     width::{shortened, shortened_inside, width},
 };
 use curvelax_ensemble::study::PORTRAITS;
@@ -35,8 +36,6 @@ const GAP: f64 = 14.0;
 const MARGIN: f64 = 24.0;
 const HEAD: f64 = 48.0;
 const FOOT: f64 = 40.0;
-/// Sizes that differ by more than this factor are drawn each to its own scale.
-const MIXED: f64 = 6.0;
 /// A picture this wide has room for the heading.
 const MIN_COLUMNS: usize = 2;
 /// Intermediate states: those with about this fraction of the way to the end left. The excess, which goes with the
@@ -143,7 +142,8 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
     let (columns, side) = columns(medium, panels.len());
     let rows = panels.len().div_ceil(columns).max(1);
-    let layout = PanelLayout::new(&panels, side);
+    let bounds: Vec<_> = panels.iter().filter_map(MemberPanel::bounds).collect();
+    let layout = PanelLayout::new(&bounds, side, PADDING, MIN_HEIGHT);
     let frame = layout.frame;
     let caption = CAPTION + if wording.has_cells() { LINE } else { 0.0 };
     let pitch = frame + DVec2::new(GAP, caption);
@@ -232,31 +232,29 @@ fn draw_panel(
     svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
     let mut across = String::new();
-    if let Some((low, high)) = panel.bounds() {
-        let own = (high - low).max_element();
-        let scale = layout.scale(own);
+    if let Some(bounds) = panel.bounds() {
         if layout.common.is_none() {
-            across = format!(", {}{unit} across", rounded(own));
+            across = format!(", {}{unit} across", rounded((bounds.1 - bounds.0).max_element()));
         }
-        // y grows downwards in SVG.
-        let place = |p: &DVec2| middle + (*p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
+        let place = layout.place(bounds, corner);
+        let place = |nodes: &[DVec2]| nodes.iter().map(|node| place(*node)).collect::<Vec<_>>();
         let last = panel.states.len() - 1;
         if !rest.is_empty() {
-            svg.path("rest", &closed_path(&rest.iter().map(place).collect::<Vec<_>>()));
+            svg.path("rest", &closed_path(&place(rest)));
         }
         for (i, nodes) in panel.states.iter().enumerate() {
-            let nodes: Vec<DVec2> = nodes.iter().map(place).collect();
+            let nodes = place(nodes);
             let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
             svg.path(class, &closed_path(&nodes));
-            if i == last && nodes.len() == *points && mean_spacing(&nodes) >= MIN_SPACING {
+            if i == last && nodes.len() == *points && polygon::length(&nodes) >= MIN_SPACING * nodes.len() as f64 {
                 svg.path("nodes", &dots(&nodes));
             }
         }
     }
     let below = DVec2::new(middle.x, corner.y + frame.y + 16.0);
-    let room = layout.side() - width(&across, SIZE);
+    let room = frame.x - width(&across, SIZE);
     let name = shortened_inside(&panel.film.name(MAX_NAME), SIZE, room) + &across;
-    svg.text("middle", below, &shortened(&name, SIZE, layout.side()));
+    svg.text("middle", below, &shortened(&name, SIZE, frame.x));
     svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
     let lines = if cell.is_empty() { 1.0 } else { 2.0 };
     svg.text("middle word", below + DVec2::new(0.0, lines * LINE), end);
@@ -266,62 +264,12 @@ fn draw_panel(
 /// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.
 fn draw_scale(svg: &mut Svg, left: DVec2, layout: &PanelLayout, largest: f64, unit: &str) {
     let scale = layout.scale(largest);
-    let most = 0.5 * layout.side() / scale;
+    let most = 0.5 * layout.frame.x / scale;
     let power = 10_f64.powi(most.log10().floor() as i32);
     let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
-    let [x, y, end] = [left.x, left.y, left.x + length * scale].map(coordinate);
-    let [top, bottom] = [left.y - 4.0, left.y + 4.0].map(coordinate);
-    svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
-    let label = DVec2::new(left.x + length * scale + 8.0, left.y + 4.0);
     let shown = rounded(length);
     let named = if unit.is_empty() { format!("length {shown}") } else { format!("{shown}{unit}") };
-    svg.text("note", label, &named);
-}
-
-/// The layout common to all panels.
-struct PanelLayout {
-    /// The extent that fills a panel; if there is none, each member fills its own.
-    common: Option<f64>,
-    /// Size of a panel.
-    frame: DVec2,
-}
-
-/// What is said where each member has its own scale.
-pub(super) const OWN_SCALES: &str = "each to its own scale";
-
-/// The largest of these extents, if all can be seen at one scale.
-pub(super) fn common_extent(extents: impl Iterator<Item = f64> + Clone) -> Option<f64> {
-    let largest = extents.clone().fold(0.0, f64::max);
-    let smallest = extents.filter(|extent| *extent > 0.0).fold(largest, f64::min);
-    (largest <= MIXED * smallest).then_some(largest)
-}
-
-impl PanelLayout {
-    /// Fits `panels` into frames that are no higher than the tallest panel needs.
-    fn new(panels: &[MemberPanel], side: f64) -> PanelLayout {
-        let extents: Vec<DVec2> = panels.iter().filter_map(MemberPanel::bounds).map(|(low, high)| high - low).collect();
-        let common = common_extent(extents.iter().map(|extent| extent.max_element()));
-        let layout = PanelLayout { common, frame: DVec2::new(side, side) };
-        let heights = extents.iter().map(|extent| extent.y * layout.scale(extent.max_element()));
-        let height = (heights.fold(0.0, f64::max) + 2.0 * PADDING).clamp(MIN_HEIGHT, side);
-        PanelLayout { frame: DVec2::new(side, height), ..layout }
-    }
-
-    /// Width of a panel.
-    fn side(&self) -> f64 {
-        self.frame.x
-    }
-
-    /// Pixels per unit of length, for a member of this extent.
-    fn scale(&self, own: f64) -> f64 {
-        let extent = self.common.unwrap_or(own);
-        if extent > 0.0 && extent.is_finite() { (self.side() - 2.0 * PADDING) / extent } else { 1.0 }
-    }
-}
-
-fn mean_spacing(points: &[DVec2]) -> f64 {
-    let length: f64 = points.iter().zip(points.iter().cycle().skip(1)).map(|(a, b)| a.distance(*b)).sum();
-    length / points.len().max(1) as f64
+    draw_bar(svg, [left, left + DVec2::new(length * scale, 0.0)], &named);
 }
 
 /// `value` to three significant digits.
@@ -400,8 +348,8 @@ mod tests {
         let mut panels: Vec<MemberPanel> = films.iter().map(MemberPanel::new).collect();
         panels[1].states[0].iter_mut().for_each(|p| *p *= 3.0);
         let slack = |panels: &[MemberPanel], i: usize| {
-            let layout = PanelLayout::new(panels, SIDE);
-            let (low, high) = panels[i].bounds().unwrap();
+            let bounds: Vec<_> = panels.iter().filter_map(MemberPanel::bounds).collect();
+            let (layout, (low, high)) = (PanelLayout::new(&bounds, SIDE, PADDING, MIN_HEIGHT), bounds[i]);
             layout.frame - (high - low) * layout.scale((high - low).max_element()) - 2.0 * PADDING
         };
         let (large, small) = (slack(&panels, 1), slack(&panels, 0));
@@ -409,14 +357,6 @@ mod tests {
         // Where the others would be specks, each fills its panel.
         panels[1].states[0].iter_mut().for_each(|p| *p *= 10.0);
         assert!((0..3).all(|i| slack(&panels, i).x.abs() < 1e-9));
-    }
-
-    #[test]
-    fn members_of_very_different_sizes_have_their_own_scales_and_say_so() {
-        assert_eq!(common_extent([1.0, 6.0, 2.0].into_iter()), Some(6.0));
-        assert_eq!(common_extent([1.0, 6.1, 2.0].into_iter()), None);
-        assert_eq!(common_extent([0.0, 2.0].into_iter()), Some(2.0));
-        assert_eq!(common_extent(std::iter::empty()), Some(0.0));
     }
 
     #[test]

@@ -6,6 +6,7 @@
 pub mod complete;
 pub mod document;
 pub mod gallery;
+mod members_layout;
 pub mod merge;
 pub mod movie;
 pub mod overview;

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::{GREY, HOLD, MARGIN, Movie, MoviePanel};
-use crate::report::gallery::OWN_SCALES;
+use crate::report::members_layout::OWN_SCALES;
 use curvelax_base::error::{Error, Result};
 use curvelax_draw::{
     gif::{MovingGif, Palette},

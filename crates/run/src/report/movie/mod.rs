@@ -16,7 +16,7 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::{
-    gallery::common_extent,
+    members_layout::PanelLayout,
     page::spread,
     words::{RAW_CLOCK, in_the_limit},
 };
@@ -112,25 +112,21 @@ impl Movie {
         let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
         let boxes: Vec<Option<(DVec2, DVec2)>> =
             states.iter().map(|states| polygon::bounds(states.iter().flatten().copied())).collect();
-        let extents = boxes.iter().flatten().map(|(low, high)| *high - *low);
-        extents.clone().next()?;
+        let known: Vec<(DVec2, DVec2)> = boxes.iter().flatten().copied().collect();
+        if known.is_empty() {
+            return None;
+        }
 
         let width = f64::from(cut.width);
         let fitting = ((width - 2.0 * MARGIN + GAP) / (MIN_SIDE + GAP)) as usize;
         let columns = fitting.clamp(1, MAX_COLUMNS).min(films.len());
         let side = ((width - 2.0 * MARGIN + GAP) / columns as f64 - GAP).floor();
-        let fits = |extent: f64| match extent > 0.0 && extent.is_finite() {
-            true => (side - 2.0 * PADDING) / extent,
-            false => 1.0,
-        };
-        let common = common_extent(extents.clone().map(|extent| extent.max_element()));
-        let own_scale = |extent: DVec2| fits(common.unwrap_or(extent.max_element()));
-        let tallest = extents.map(|extent| extent.y * own_scale(extent)).fold(0.0, f64::max);
-        let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT.min(side), side).ceil();
-        let frame = DVec2::new(side, height);
+        let mut layout = PanelLayout::new(&known, side, PADDING, MIN_HEIGHT);
+        layout.frame.y = layout.frame.y.ceil();
+        let frame = layout.frame;
         let length_unit = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length));
         let names = |film: &Film, extent: DVec2| {
-            let own = match common {
+            let own = match layout.common {
                 Some(_) => film.name(MAX_NAME),
                 None => {
                     format!("{}, {}{length_unit} across", film.name(MAX_NAME), rounded(extent.max_element(), 2))
@@ -149,10 +145,8 @@ impl Movie {
             let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
             let corner = DVec2::new(MARGIN, HEAD) + place * pitch;
             let (low, high) = bounds.unwrap_or_default();
-            let scale = own_scale(high - low);
-            // y grows downwards in a picture.
-            let pixel = |p: DVec2| corner + 0.5 * frame + (p - 0.5 * (low + high)) * DVec2::new(scale, -scale);
-            let moved = states.into_iter().map(|nodes| nodes.into_iter().map(pixel).collect());
+            let pixel = layout.place((low, high), corner);
+            let moved = states.into_iter().map(|nodes| nodes.into_iter().map(&pixel).collect());
             let frames = film.times.iter().copied().zip(moved).collect();
             let unit = time_unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             let end = match (film.t_relax.filter(|_| film.status != Status::Vanished), t_limit(film.member)) {
@@ -165,7 +159,7 @@ impl Movie {
         });
         let panels: Vec<MoviePanel> = panels.collect();
         let pace = MoviePace::new(&panels.iter().map(|panel| panel.member.clone()).collect::<Vec<_>>());
-        let bar = common.map(fits).map(|scale| {
+        let bar = layout.common.map(|extent| layout.scale(extent)).map(|scale| {
             let length = tick_step(BAR * side / scale);
             let shown = rounded(length, 1);
             let named = if spec.units.is_some() { format!("{shown}{length_unit}") } else { format!("length {shown}") };

@@ -8,7 +8,10 @@ use std::fmt::Write;
 use glam::DVec2;
 
 use super::{HOLD, MARGIN, Movie, MoviePanel, gif::INSIDE};
-use crate::report::gallery::{self, OWN_SCALES};
+use crate::report::{
+    gallery,
+    members_layout::{OWN_SCALES, draw_bar},
+};
 use curvelax_draw::{
     medium::Medium,
     svg::{Svg, coordinate, escape},
@@ -42,11 +45,7 @@ impl Movie {
         self.clock_in(&mut svg);
         self.panels.iter().for_each(|panel| self.panel(&mut svg, panel));
         match self.bar() {
-            Some(([left, right], text)) => {
-                let [x, end, y, top, bottom] = [left.x, right.x, left.y, left.y - 4.0, left.y + 4.0].map(coordinate);
-                svg.path("scale", &format!("M{x} {top}V{bottom}M{x} {y}H{end}M{end} {top}V{bottom}"));
-                svg.text("note", right + DVec2::new(8.0, 4.0), text);
-            }
+            Some((ends, text)) => draw_bar(&mut svg, ends, text),
             None => svg.text("note", self.foot() + DVec2::new(0.0, 4.0), OWN_SCALES),
         }
         svg.finish()

@@ -3,13 +3,11 @@
 //! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits
 //! of base64. The script `page.js` reads them and moves the nodes on straight lines from one time to the next.
 
-use std::{fmt::Write as _, io};
+use std::fmt::Write as _;
 
 use glam::DVec2;
-use serde::Serialize;
-use serde_json::{Serializer, ser::Formatter};
 
-use crate::report::gallery::common_extent;
+use crate::report::members_layout::PanelLayout;
 use curvelax_base::text::significant;
 use curvelax_curve::polygon;
 use curvelax_draw::{
@@ -65,8 +63,8 @@ impl MovingMember {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Player {
     members: Vec<PlayedMember>,
-    /// Units of length in one unit of the coordinates, if it is the same for all.
-    unit: Option<f64>,
+    /// Coordinates in a unit of length, if these are the same for all.
+    scale: Option<f64>,
     /// Height of a panel, in coordinates.
     height: f64,
     /// Units of length and time, each after a space; may be empty.
@@ -82,103 +80,31 @@ struct PlayedMember {
     frames: Vec<Vec<u16>>,
 }
 
-/// The data of the script.
-#[derive(Serialize)]
-struct PlayerData {
-    marks: Vec<f64>,
-    members: Vec<MemberData>,
-}
-
-/// The data of a member; a frame is a string of digits.
-#[derive(Serialize)]
-struct MemberData {
-    times: Vec<f64>,
-    frames: Vec<String>,
-}
-
-/// JSON with a line for each member and each of its frames, so that no line of the page gets too long. Numbers are as
-/// short as elsewhere on the page: `0` instead of `0.0`.
-#[derive(Default)]
-struct LineBreaks {
-    /// Number of open objects.
-    depth: usize,
-    /// A comma was written, and the next item in the list is not known yet.
-    after_comma: bool,
-}
-
-impl LineBreaks {
-    fn break_line<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
-        match std::mem::take(&mut self.after_comma) {
-            true => writer.write_all(b"\n"),
-            false => Ok(()),
-        }
-    }
-}
-
-impl Formatter for LineBreaks {
-    fn write_f64<W: io::Write + ?Sized>(&mut self, writer: &mut W, value: f64) -> io::Result<()> {
-        self.after_comma = false;
-        write!(writer, "{value}")
-    }
-
-    fn begin_array_value<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
-        self.after_comma = !first;
-        if first { Ok(()) } else { writer.write_all(b",") }
-    }
-
-    fn begin_string<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
-        self.break_line(writer)?;
-        writer.write_all(b"\"")
-    }
-
-    fn begin_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
-        self.depth += 1;
-        self.break_line(writer)?;
-        writer.write_all(b"{")
-    }
-
-    fn end_object<W: io::Write + ?Sized>(&mut self, writer: &mut W) -> io::Result<()> {
-        self.depth -= 1;
-        writer.write_all(b"}")
-    }
-
-    fn begin_object_key<W: io::Write + ?Sized>(&mut self, writer: &mut W, first: bool) -> io::Result<()> {
-        match (first, self.depth) {
-            (true, _) => Ok(()),
-            (false, 1) => writer.write_all(b",\n"),
-            (false, _) => writer.write_all(b","),
-        }
-    }
-}
-
 impl Player {
     /// Uses the first of `trajectories` that have a time to show; none if none has.
     pub fn new(trajectories: &[MovingMember], units: &[String; 2]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
-        let extents = boxes.iter().map(|(low, high)| *high - *low);
-        let unit_of = |extent: f64| if extent > 0.0 { extent / (LARGEST - 2.0 * PADDING) } else { 1.0 };
-        let common = common_extent(extents.clone().map(|extent| extent.max_element()));
-        let own_unit = |extent: DVec2| unit_of(common.unwrap_or(extent.max_element()));
-        let tallest = extents.map(|extent| extent.y / own_unit(extent)).reduce(f64::max)?;
-        let height = (tallest + 2.0 * PADDING).clamp(MIN_HEIGHT * LARGEST, LARGEST).round();
-        let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), (low, high))| {
-            let unit = own_unit(high - low);
-            // y grows downwards in SVG.
-            let place =
-                |p: DVec2| (p - 0.5 * (low + high)) * DVec2::new(1.0, -1.0) / unit + 0.5 * DVec2::new(LARGEST, height);
+        if boxes.is_empty() {
+            return None;
+        }
+        let mut layout = PanelLayout::new(&boxes, LARGEST, PADDING, MIN_HEIGHT * LARGEST);
+        layout.frame.y = layout.frame.y.round();
+        let members = shown.into_iter().zip(boxes).map(|((trajectory, frames), bounds)| {
+            let place = layout.place(bounds, DVec2::ZERO);
             let whole = |nodes: &[DVec2]| {
                 nodes.iter().flat_map(|p| place(*p).to_array()).map(|v| v.round().clamp(0.0, LARGEST) as u16).collect()
             };
             let (times, frames) = frames.iter().map(|(t, nodes)| (*t, whole(nodes))).unzip();
-            let size = match common {
+            let size = match layout.common {
                 Some(_) => String::new(),
-                None => format!(", {}{} across", significant((high - low).max_element(), 2), units[0]),
+                None => format!(", {}{} across", significant((bounds.1 - bounds.0).max_element(), 2), units[0]),
             };
             PlayedMember { label: format!("{}{size}", trajectory.label), status: trajectory.status, times, frames }
         });
-        Some(Player { members: members.collect(), unit: common.map(unit_of), height, units: units.clone() })
+        let (members, scale) = (members.collect(), layout.common.map(|extent| layout.scale(extent)));
+        Some(Player { members, scale, height: layout.frame.y, units: units.clone() })
     }
 
     /// Whether anything moves.
@@ -226,17 +152,16 @@ impl Player {
         html
     }
 
-    /// The data of the script: numbers and digits of base64 only.
+    /// The data of the script: JSON of numbers and digits of base64 only. Each member and each of its frames begins a
+    /// line, so that no line of the page gets too long.
     pub fn data(&self) -> String {
-        let member = |PlayedMember { times, frames, .. }: &PlayedMember| MemberData {
-            times: times.clone(),
-            frames: frames.iter().map(|frame| digits(frame)).collect(),
+        let numbers = |all: &[f64]| all.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+        let member = |PlayedMember { times, frames, .. }: &PlayedMember| {
+            let frames: Vec<String> = frames.iter().map(|frame| format!("\"{}\"", digits(frame))).collect();
+            format!("{{\"times\":[{}],\"frames\":[{}]}}", numbers(times), frames.join(",\n"))
         };
-        let data = PlayerData { marks: self.marks(), members: self.members.iter().map(member).collect() };
-        let mut bytes = Vec::new();
-        let written = data.serialize(&mut Serializer::with_formatter(&mut bytes, LineBreaks::default()));
-        written.expect("numbers and strings are JSON, and memory takes them");
-        String::from_utf8(bytes).expect("JSON is UTF-8")
+        let members: Vec<String> = self.members.iter().map(member).collect();
+        format!("{{\"marks\":[{}],\n\"members\":[{}]}}", numbers(&self.marks()), members.join(",\n"))
     }
 
     /// Times at equal distances along the slider; if there are many, it moves slowly.
@@ -249,9 +174,9 @@ impl Player {
 
     /// A round length, and the same in coordinates, if all have one scale.
     fn bar(&self) -> Option<(f64, f64)> {
-        let unit = self.unit?;
-        let length = tick_step(0.15 * LARGEST * unit);
-        Some((length, length / unit))
+        let scale = self.scale?;
+        let length = tick_step(0.15 * LARGEST / scale);
+        Some((length, length * scale))
     }
 
     fn scale_bar(&self) -> String {
@@ -321,7 +246,7 @@ mod tests {
             for (at, node) in frame.chunks_exact(2).zip(nodes) {
                 let back = (DVec2::new(f64::from(at[0]), player.height - f64::from(at[1]))
                     - 0.5 * DVec2::new(LARGEST, player.height))
-                    * player.unit.unwrap();
+                    / player.scale.unwrap();
                 assert!(back.distance(*node) < 1e-3 * 4e6, "{back} {node}");
             }
         }
