@@ -19,6 +19,7 @@ use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
 use curvelax_files::zarr;
 use curvelax_study::placement::{ChosenBackend, Platform};
 use finer::{FinerPilot, LevelGrowth};
+pub use pilot::Pilot;
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
 use size::Residents;
 
@@ -67,23 +68,6 @@ pub struct Estimate {
     pub seconds: Option<f64>,
     /// The basis of the estimate.
     pub pilot: Pilot,
-}
-
-/// The pilots of all cohorts together.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
-pub struct Pilot {
-    /// Members started.
-    pub members: u64,
-    /// Members that ended.
-    pub ended: u64,
-    /// Members that ended neither relaxed nor at the end of their time.
-    pub failed: u64,
-    /// Members that relaxed.
-    pub relaxed: u64,
-    /// Members that have a rate.
-    pub rated: u64,
-    /// Time used.
-    pub seconds: f64,
 }
 
 impl Estimate {
@@ -138,7 +122,7 @@ impl Estimate {
                 rows,
                 chunks: if stage.level.is_none() { chunks } else { 0 },
             };
-            let largest = pilots.iter().map(|seen| seen.members).max().unwrap_or(0);
+            let largest = pilots.iter().map(|seen| seen.counts.members).max().unwrap_or(0);
             let in_pilot = of(largest, in_pilot);
             in_pilots = in_pilots.max(in_pilot.in_pilot(reads_back));
             // A driver and states that are read back take more than rows.
@@ -151,7 +135,7 @@ impl Estimate {
             }
             opened = Some(platform);
             residents.push(of(stage.members, each));
-            pilots.iter().for_each(|seen| pilot.add(seen));
+            pilots.iter().for_each(|seen| pilot.add(&seen.counts));
             own.add(&work);
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
@@ -247,17 +231,6 @@ fn slots_at(spec: &Spec, choice: &ChosenBackend) -> Result<(usize, Option<usize>
         DeviceKind::Gpu => None,
     };
     Ok((spec.points, slots))
-}
-
-impl Pilot {
-    fn add(&mut self, seen: &pilot::PilotResult) {
-        self.members += seen.members;
-        self.ended += seen.left;
-        self.failed += seen.failed;
-        self.relaxed += seen.relaxed;
-        self.rated += seen.rated;
-        self.seconds += seen.seconds;
-    }
 }
 
 #[cfg(test)]

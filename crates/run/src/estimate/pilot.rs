@@ -9,6 +9,8 @@ use std::{
     time::{Duration, Instant},
 };
 
+use serde::Serialize;
+
 use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
@@ -68,15 +70,41 @@ impl CohortWork {
     }
 }
 
-/// The result of one pilot.
-#[derive(Clone, Debug)]
-pub struct PilotResult {
+/// The pilots of all cohorts together.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Pilot {
+    /// Members started.
     pub members: u64,
-    /// Members that have ended, and the steps that they made.
-    pub left: u64,
+    /// Members that ended.
+    pub ended: u64,
+    /// Members that ended neither relaxed nor at the end of their time.
     pub failed: u64,
+    /// Members that relaxed.
     pub relaxed: u64,
+    /// Members that have a rate.
     pub rated: u64,
+    /// Time used.
+    pub seconds: f64,
+}
+
+impl Pilot {
+    /// Adds another pilot.
+    pub fn add(&mut self, seen: &Pilot) {
+        self.members += seen.members;
+        self.ended += seen.ended;
+        self.failed += seen.failed;
+        self.relaxed += seen.relaxed;
+        self.rated += seen.rated;
+        self.seconds += seen.seconds;
+    }
+}
+
+/// The result of one pilot.
+#[derive(Clone, Debug, Default)]
+pub struct PilotResult {
+    /// What is counted of all pilots.
+    pub counts: Pilot,
+    /// Steps of the members that have ended.
     pub steps: u64,
     /// Bytes of their rows.
     pub rows: f64,
@@ -86,7 +114,6 @@ pub struct PilotResult {
     /// Fraction of the work that was done.
     pub share: f64,
     pub dispatches: u64,
-    pub seconds: f64,
     /// Work done, in updates of nodes.
     pub work: f64,
     /// The members that ended, ascending, if they are asked for.
@@ -95,22 +122,7 @@ pub struct PilotResult {
 
 impl PilotResult {
     pub fn new(members: u64) -> PilotResult {
-        PilotResult {
-            members,
-            left: 0,
-            failed: 0,
-            relaxed: 0,
-            rated: 0,
-            steps: 0,
-            rows: 0.0,
-            series: 0,
-            snapshots: 0,
-            share: 0.0,
-            dispatches: 0,
-            seconds: 0.0,
-            work: 0.0,
-            ended: Vec::new(),
-        }
+        PilotResult { counts: Pilot { members, ..Pilot::default() }, ..PilotResult::default() }
     }
 }
 
@@ -137,11 +149,11 @@ struct PilotSink<'a> {
 impl Sink for PilotSink<'_> {
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let seen = &mut self.seen;
-        seen.left += 1;
         seen.ended.extend(self.limits.keeps_members.then(|| ended.outcome.clone()));
-        seen.failed += u64::from(ended.outcome.status.is_failure());
-        seen.relaxed += u64::from(ended.outcome.t_relax.is_some());
-        seen.rated += u64::from(ended.outcome.rate.is_some());
+        seen.counts.ended += 1;
+        seen.counts.failed += u64::from(ended.outcome.status.is_failure());
+        seen.counts.relaxed += u64::from(ended.outcome.t_relax.is_some());
+        seen.counts.rated += u64::from(ended.outcome.rate.is_some());
         seen.steps += ended.outcome.steps;
         seen.series += ended.rows.series.len();
         seen.snapshots += ended.rows.snapshots.len();
@@ -335,19 +347,18 @@ pub fn sample(
         (count, budget) = (more.min(all), f64::INFINITY);
     }
     cohort.iter_mut().zip(own).for_each(|(cell, only)| cell.spec.only = only);
-    let ended = pilots.iter().rfind(|seen| seen.left > 0);
-    let steps = ended.map(|seen| seen.steps as f64 / seen.left as f64);
-    let each = |count: fn(&PilotResult) -> usize| ended.map(|seen| count(seen) as f64 / seen.left as f64);
+    let ended = pilots.iter().rfind(|seen| seen.counts.ended > 0);
+    let per_member = |of: fn(&PilotResult) -> f64| ended.map(|seen| of(seen) / seen.counts.ended as f64);
     let [most_series, most_snapshots] = most_rows(cohort);
     let work = CohortWork {
         members: all as f64,
-        seconds: extrapolated(&pilots, all, |seen| seen.seconds),
+        seconds: extrapolated(&pilots, all, |seen| seen.counts.seconds),
         dispatches: extrapolated(&pilots, all, |seen| seen.dispatches as f64),
-        steps: steps.or_else(|| certain_steps(cohort)).map(|each| each * all as f64),
-        series: each(|seen| seen.series).unwrap_or(most_series) * all as f64,
-        nodes: each(|seen| seen.snapshots).unwrap_or(most_snapshots) * all as f64 * points(cohort) as f64,
+        steps: per_member(|seen| seen.steps as f64).or_else(|| certain_steps(cohort)).map(|each| each * all as f64),
+        series: per_member(|seen| seen.series as f64).unwrap_or(most_series) * all as f64,
+        nodes: per_member(|seen| seen.snapshots as f64).unwrap_or(most_snapshots) * all as f64 * points(cohort) as f64,
     };
-    let rows = ended.map_or_else(|| all_rows(cohort), |seen| seen.rows / seen.left as f64);
+    let rows = per_member(|seen| seen.rows).unwrap_or_else(|| all_rows(cohort));
     let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
     let reads_back = cohort.iter().any(|cell| !cell.spec.snapshots.is_empty()) && share > 0.0;
     Ok(CohortSample { work, pilots, rows: [rows, share * rows], reads_back })
@@ -383,7 +394,7 @@ fn pilot(
     if end == End::GivenUp {
         seen = PilotResult::new(count);
     }
-    (seen.seconds, seen.work, seen.dispatches) = (started.elapsed().as_secs_f64(), work, dispatches);
+    (seen.counts.seconds, seen.work, seen.dispatches) = (started.elapsed().as_secs_f64(), work, dispatches);
     Ok((end, seen))
 }
 
@@ -407,7 +418,8 @@ fn most_rows(cohort: &[Cell]) -> [f64; 2] {
 /// The cost of `all` members from that of the pilots, each scaled to its end.
 fn extrapolated(pilots: &[PilotResult], all: u64, cost: impl Fn(&PilotResult) -> f64) -> Option<f64> {
     let whole = |seen: &PilotResult| (seen.share > 0.0).then(|| cost(seen) / seen.share.min(1.0));
-    let known: Vec<(f64, f64)> = pilots.iter().filter_map(|seen| Some((seen.members as f64, whole(seen)?))).collect();
+    let known: Vec<(f64, f64)> =
+        pilots.iter().filter_map(|seen| Some((seen.counts.members as f64, whole(seen)?))).collect();
     let (members, most) = *known.last()?;
     let each = match known[..] {
         [.., (fewer, less), _] if most > less => (most - less) / (members - fewer),
@@ -491,12 +503,12 @@ mod tests {
     }
 
     fn seen(members: u64, share: f64, seconds: f64) -> PilotResult {
-        PilotResult { share, seconds, ..PilotResult::new(members) }
+        PilotResult { counts: Pilot { members, seconds, ..Pilot::default() }, share, ..PilotResult::default() }
     }
 
     #[test]
     fn costs_are_extrapolated_from_the_two_largest_pilots() {
-        let of = |pilots: &[PilotResult], all| extrapolated(pilots, all, |seen| seen.seconds);
+        let of = |pilots: &[PilotResult], all| extrapolated(pilots, all, |seen| seen.counts.seconds);
         // A fixed cost of 0.3 s, and 0.01 s per member.
         let pilots = [seen(10, 1.0, 0.4), seen(110, 1.0, 1.4)];
         assert!((of(&pilots, 1010).unwrap() - 10.4).abs() < 1e-12);
@@ -525,7 +537,7 @@ mod tests {
             Limits { work, keeps_members: false, until: Instant::now() + Duration::from_secs(3600), stopped: &|| None };
         let sample = sample(cells, Precision::F64, &mut backend, &limits).unwrap();
         let seen = sample.pilots.last().unwrap().clone();
-        (seen.members, seen.left, seen.steps, seen.share, seen.work)
+        (seen.counts.members, seen.counts.ended, seen.steps, seen.share, seen.work)
     }
 
     #[test]
