@@ -10,6 +10,7 @@ use super::{
     medium::Medium,
     style,
     svg::{Svg, coordinate, dots},
+    trace,
     width::{SIZE, TITLE, distinct, shortened, width, wrapped},
 };
 use curvelax_base::{interval::Interval, text::significant};
@@ -305,6 +306,17 @@ impl Panel<'_> {
         DVec2::new(self.across(x), self.end().y - self.size.y * self.y.share(y))
     }
 
+    /// The positions of those points that can be shown on axes of these scales, inside the panel or not.
+    pub fn points(&self, points: impl IntoIterator<Item = (f64, f64)>) -> Vec<DVec2> {
+        let shown = points.into_iter().filter(|(x, y)| self.x.scale().holds(*x) && self.y.scale().holds(*y));
+        shown.map(|(x, y)| self.place(x, y)).collect()
+    }
+
+    /// Path data of the parts of a line that are inside.
+    pub fn clipped(&self, line: &[DVec2]) -> String {
+        trace::clipped(line, self.corner, self.end()).iter().map(|part| trace::path(part)).collect()
+    }
+
     /// Draws the axes.
     pub fn draw(&self, svg: &mut Svg) {
         self.draw_x(svg);
@@ -595,9 +607,4 @@ impl Colours {
         let at = DVec2::new(corner.x + BAR + right + 12.0 + AXIS_SIZE, panel.corner.y + 0.5 * panel.size.y);
         svg.text_upwards("axis middle", at, &name);
     }
-}
-
-/// Whether a point can be shown on axes of these scales.
-pub fn drawable(x: (Scale, f64), y: (Scale, f64)) -> bool {
-    x.0.holds(x.1) && y.0.holds(y.1)
 }

@@ -2,10 +2,10 @@
 
 use glam::DVec2;
 
-use super::{MAX_BANDS, TIME, only_panel};
+use super::{Band, TIME, draw_band, only_panel, shows_bands};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel, drawable},
+    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel},
     medium::Medium,
     trace,
 };
@@ -41,7 +41,7 @@ pub struct DecayCurve {
     /// Mean excess at each time.
     pub mean: Vec<f64>,
     /// Lower and upper bounds at each time, or nothing; values that are not positive are drawn at the bottom.
-    pub band: Option<(Vec<f64>, Vec<f64>)>,
+    pub band: Option<Band>,
 }
 
 /// A theoretical line.
@@ -88,15 +88,8 @@ impl DecayLaw {
         let (scale, (first, last)) = (panel.x.scale(), panel.x.range());
         let [first, last] = [first, last].map(|t| scale.level(t));
         let times = (0..=PIECES).map(|i| scale.value(first + (last - first) * f64::from(i) / f64::from(PIECES)));
-        let points = times.map(|t| (t, self.at(t))).filter(|(t, excess)| drawable((scale, *t), (Scale::Log, *excess)));
-        let points: Vec<DVec2> = points.map(|(t, excess)| panel.place(t, excess)).collect();
-        clipped(&points, panel)
+        panel.clipped(&panel.points(times.map(|t| (t, self.at(t)))))
     }
-}
-
-/// Path data of the parts of a line inside a panel.
-fn clipped(points: &[DVec2], panel: &Panel) -> String {
-    trace::clipped(points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
 }
 
 impl DecayCurve {
@@ -104,10 +97,7 @@ impl DecayCurve {
     fn line(&self, values: &[f64], panel: &Panel, least: f64, floor: bool) -> Vec<DVec2> {
         let low = panel.y.range().0;
         let raised = |value: f64| if floor && value < low { low } else { value };
-        let pairs = self.t.iter().zip(values).map(|(t, value)| (*t, raised(*value)));
-        let pairs = pairs.filter(|(t, value)| drawable((panel.x.scale(), *t), (panel.y.scale(), *value)));
-        let points: Vec<DVec2> = pairs.map(|(t, value)| panel.place(t, value)).collect();
-        trace::thinned(&points, least)
+        trace::thinned(&panel.points(self.t.iter().zip(values).map(|(t, value)| (*t, raised(*value)))), least)
     }
 }
 
@@ -120,7 +110,7 @@ impl Decay<'_> {
         let times = || curves.iter().flat_map(|curve| curve.t.iter().copied());
         let scale = self.time.filter(|scale| times().any(|t| scale.holds(t))).unwrap_or(Scale::Linear);
         let drawn = |curve: &DecayCurve| {
-            curve.t.iter().zip(&curve.mean).filter(|(t, mean)| drawable((scale, **t), (Scale::Log, **mean))).count()
+            curve.t.iter().zip(&curve.mean).filter(|(t, mean)| scale.holds(**t) && Scale::Log.holds(**mean)).count()
         };
         match curves.iter().map(drawn).max() {
             None | Some(0) => return heading.nothing(medium, "There is no positive mean excess to draw."),
@@ -142,11 +132,9 @@ impl Decay<'_> {
         for (i, class) in &colours.shown {
             let curve = &curves[*i];
             svg.open(class);
-            if let Some((low, high)) = curve.band.as_ref().filter(|_| bands) {
-                let [low, high] = [low, high].map(|bound| curve.line(bound, &panel, least, true));
-                svg.path("band", &trace::band(&high, &low));
-            }
-            svg.path("series", &clipped(&curve.line(&curve.mean, &panel, least, false), &panel));
+            let band = curve.band.as_ref().filter(|_| bands);
+            draw_band(&mut svg, band, |bound| curve.line(bound, &panel, least, true));
+            svg.path("series", &panel.clipped(&curve.line(&curve.mean, &panel, least, false)));
             svg.close();
         }
         svg.open("ink");
@@ -170,7 +158,7 @@ impl Decay<'_> {
 
     /// Whether bands are drawn.
     pub fn has_bands(&self) -> bool {
-        self.curves.len() <= MAX_BANDS && self.curves.iter().any(|curve| curve.band.is_some())
+        shows_bands(self.curves.iter().map(|curve| &curve.band))
     }
 
     fn legend(&self, colours: &Colours, bands: bool) -> Vec<Entry> {

@@ -6,7 +6,7 @@ use super::{TIME, only_panel};
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        ChartText, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable,
+        ChartText, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker,
         triangle_right, triangle_up,
     },
     medium::Medium,
@@ -161,11 +161,8 @@ impl Series {
         let at = |share: f64| low * (high / low).powf(share);
         let straight = panel.x.scale() == Scale::Log && panel.y.scale() == Scale::Log;
         let pieces = if straight { 1 } else { 100 };
-        let points = (0..=pieces).map(|i| at(f64::from(i) / f64::from(pieces)));
-        let points = points.map(|x| (x, factor * x.powf(exponent.value)));
-        let points = points.filter(|(x, t)| drawable((panel.x.scale(), *x), (panel.y.scale(), *t)));
-        let points: Vec<DVec2> = points.map(|(x, t)| panel.place(x, t)).collect();
-        trace::clipped(&points, panel.corner, panel.end()).iter().map(|part| trace::path(part)).collect()
+        let settings = (0..=pieces).map(|i| at(f64::from(i) / f64::from(pieces)));
+        panel.clipped(&panel.points(settings.map(|x| (x, factor * x.powf(exponent.value)))))
     }
 }
 

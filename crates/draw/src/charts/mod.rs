@@ -37,12 +37,28 @@ use super::{
     chart::{MARGIN, Panel},
     medium::Medium,
     svg::Svg,
+    trace,
 };
 
 /// The unit of all times.
 const TIME: &str = "length⁴";
 /// With more curves than this, bands would hide each other.
 const MAX_BANDS: usize = 4;
+
+/// The lower and upper bounds of a curve at each of its times.
+pub type Band = (Vec<f64>, Vec<f64>);
+
+/// Whether the bands of curves are drawn, of which each may have one.
+fn shows_bands<'a>(bands: impl ExactSizeIterator<Item = &'a Option<Band>>) -> bool {
+    bands.len() <= MAX_BANDS && bands.into_iter().any(Option::is_some)
+}
+
+/// Draws the band of a curve, if it is shown, from the line of each of its bounds.
+fn draw_band(svg: &mut Svg, band: Option<&Band>, line: impl Fn(&[f64]) -> Vec<DVec2>) {
+    if let Some((low, high)) = band {
+        svg.path("band", &trace::band(&line(high), &line(low)));
+    }
+}
 
 /// The panel of a picture that has only one, `height` high below `top`, with `room` for a colour bar at its right.
 fn only_panel<'a>(svg: &Svg, [x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {

@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, Panel, drawable, triangle_up},
+    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, Panel, triangle_up},
     medium::Medium,
     svg::{Svg, dots},
     width::{SIZE, shortened},
@@ -60,7 +60,7 @@ pub struct ScatterPoint {
 
 impl ScatterPoint {
     fn is_drawable(&self) -> bool {
-        drawable((Scale::Linear, self.x), (Scale::Linear, self.t))
+        Scale::Linear.holds(self.x) && Scale::Linear.holds(self.t)
     }
 
     /// The mark, with a text for the pointer.

@@ -4,7 +4,7 @@ use std::iter;
 
 use glam::DVec2;
 
-use super::{MAX_BANDS, TIME, only_panel};
+use super::{Band, TIME, draw_band, only_panel, shows_bands};
 use crate::{
     axis::{Axis, Scale},
     chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel, stroke},
@@ -51,7 +51,7 @@ pub struct SurvivalCurve {
     /// Fraction that has not relaxed after each of those times, in [0, 1].
     pub survival: Vec<f64>,
     /// Lower and upper bounds of the fractions, or nothing.
-    pub band: Option<(Vec<f64>, Vec<f64>)>,
+    pub band: Option<Band>,
     /// Times at which members were censored, ascending, in length⁴.
     pub censored: Vec<f64>,
 }
@@ -155,10 +155,7 @@ impl Survival<'_> {
         for (i, class) in &colours.shown {
             let curve = &curves[*i];
             svg.open(class);
-            if let Some((low, high)) = curve.band.as_ref().filter(|_| bands) {
-                let [low, high] = [low, high].map(|shares| curve.line(shares, &panel, least));
-                svg.path("band", &trace::band(&high, &low));
-            }
+            draw_band(&mut svg, curve.band.as_ref().filter(|_| bands), |shares| curve.line(shares, &panel, least));
             svg.path("series", &trace::path(&curve.line(&curve.survival, &panel, least)));
             svg.path("thin", &curve.strokes(&panel, stroke_gap));
             svg.close();
@@ -169,7 +166,7 @@ impl Survival<'_> {
 
     /// Whether bands are drawn.
     pub fn has_bands(&self) -> bool {
-        self.curves.len() <= MAX_BANDS && self.curves.iter().any(|curve| curve.band.is_some())
+        shows_bands(self.curves.iter().map(|curve| &curve.band))
     }
 
     /// Whether strokes mark censored members.

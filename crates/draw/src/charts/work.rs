@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker, drawable},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker},
     medium::Medium,
     trace,
 };
@@ -47,12 +47,13 @@ impl WorkDiagram<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
         let WorkDiagram { title, note, costs, rows } = self;
-        let shown = |points: &[(f64, [f64; 2])], column: usize| -> Vec<(f64, f64)> {
-            let pairs = points.iter().map(|(error, costs)| (costs[column], *error));
-            pairs.filter(|(cost, error)| drawable((Scale::Log, *cost), (Scale::Log, *error))).collect()
+        let pairs = |curve: &WorkCurve, column: usize| -> Vec<(f64, f64)> {
+            curve.points.iter().map(|(error, costs)| (costs[column], *error)).collect()
         };
-        let curves = || rows.iter().flat_map(|row| &row.curves);
-        let all = |column: usize| curves().flat_map(move |curve| shown(&curve.points, column));
+        let all = |column: usize| {
+            let pairs = rows.iter().flat_map(|row| &row.curves).flat_map(move |curve| pairs(curve, column));
+            pairs.filter(|(cost, error)| Scale::Log.holds(*cost) && Scale::Log.holds(*error))
+        };
         let mut heading = Heading { title, sentences: vec![(*note).into()], legend: Vec::new() };
         if all(0).next().is_none() {
             return heading.nothing(medium, "No run gave an error.");
@@ -81,8 +82,7 @@ impl WorkDiagram<'_> {
                 }
                 panel.draw_frame(&mut svg);
                 for (rank, curve) in row.curves.iter().enumerate() {
-                    let points = shown(&curve.points, column);
-                    let places: Vec<DVec2> = points.iter().map(|(cost, error)| panel.place(*cost, *error)).collect();
+                    let places = panel.points(pairs(curve, column));
                     svg.open(&format!("s{rank}"));
                     svg.path("thin", &trace::path(&places));
                     places.iter().for_each(|at| draw_marker(&mut svg, rank, *at));
