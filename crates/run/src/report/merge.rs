@@ -6,10 +6,9 @@
 use std::{
     cmp::Reverse,
     collections::{BTreeMap, BTreeSet, BinaryHeap},
-    fs::File,
-    io::{BufWriter, Read, Seek, SeekFrom, Write},
+    io::{self, BufRead, BufReader, BufWriter, Read, Seek, SeekFrom, Write},
     ops::RangeInclusive,
-    path::{Path, PathBuf},
+    path::{Display, Path, PathBuf},
     time::Duration,
 };
 
@@ -287,18 +286,34 @@ fn total(ranges: &[RangeInclusive<u64>]) -> u64 {
     ranges.iter().map(|range| range.end() - range.start() + 1).sum()
 }
 
-/// The rows of a table of one shard. It is reopened for every block, so that any number of shards can be merged.
-struct ShardRows {
+/// The first bytes of a file, which is reopened for every block, so that any number of shards can be merged.
+struct Reopened {
     path: PathBuf,
+    /// Bytes to read.
+    length: u64,
+    /// Bytes read, and their CRC-32C.
+    read: u64,
+    crc: u32,
+}
+
+impl Read for Reopened {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let mut file = input::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.read))?;
+        let count = file.take(self.length - self.read).read(buffer)?;
+        self.read += count as u64;
+        self.crc = crc32c::crc32c_append(self.crc, &buffer[..count]);
+        Ok(count)
+    }
+}
+
+/// The rows of a table of one shard.
+struct ShardRows {
     shard: Shard,
     mark: Mark,
-    /// Bytes read, and their CRC-32C.
-    read: Mark,
-    block: usize,
-    buffer: Vec<u8>,
-    /// Position and length of the next line.
-    at: usize,
-    line: usize,
+    file: BufReader<Reopened>,
+    /// The next one.
+    line: Vec<u8>,
 }
 
 impl ShardRows {
@@ -307,57 +322,35 @@ impl ShardRows {
         let mark = part.record.head.tables.iter().find(|mark| mark.name == name).cloned();
         let missing = || Error::Request(format!("{}: the shard does not list it", path.display()));
         let mark = mark.ok_or_else(missing)?;
-        let read = Mark { name: String::new(), length: 0, crc: 0 };
-        Ok(ShardRows { path, shard: part.shard, mark, read, block, buffer: Vec::new(), at: 0, line: 0 })
+        let file = BufReader::with_capacity(block, Reopened { path, length: mark.length, read: 0, crc: 0 });
+        Ok(ShardRows { shard: part.shard, mark, file, line: Vec::new() })
+    }
+
+    fn path(&self) -> Display<'_> {
+        self.file.get_ref().path.display()
     }
 
     fn changed(&self, what: &str) -> Error {
         Error::Request(format!(
             "{}: {what}: it is not the file that the shard wrote; copy it again, or run the shard again",
-            self.path.display()
+            self.path()
         ))
     }
 
     /// Goes to the next line; none at the end of the file, when its checksum has been verified.
     fn next(&mut self) -> Result<Option<&[u8]>> {
-        self.at += self.line;
-        loop {
-            if let Some(end) = self.buffer[self.at..].iter().position(|byte| *byte == b'\n') {
-                self.line = end + 1;
-                return Ok(Some(&self.buffer[self.at..self.at + self.line]));
-            }
-            if self.read.length == self.mark.length {
-                break;
-            }
-            if self.buffer.len() - self.at > MAX_LINE {
-                return Err(self.changed(&format!("a line of more than {MAX_LINE} bytes")));
-            }
-            self.fill()?;
-        }
-        self.line = 0;
+        self.line.clear();
+        let read = self.file.by_ref().take(MAX_LINE as u64 + 1).read_until(b'\n', &mut self.line);
+        read.map_err(|e| Error::Request(format!("cannot read {}: {e}", self.path())))?;
+        let Reopened { length, read, crc, .. } = *self.file.get_ref();
         match () {
-            _ if self.at < self.buffer.len() => Err(self.changed("its last line is cut off")),
-            _ if self.read.crc != self.mark.crc => Err(self.changed("its checksum differs")),
+            _ if self.line.ends_with(b"\n") => Ok(Some(&self.line)),
+            _ if self.line.len() > MAX_LINE => Err(self.changed(&format!("a line of more than {MAX_LINE} bytes"))),
+            _ if read < length => Err(self.changed(&format!("it ends after {read} bytes"))),
+            _ if !self.line.is_empty() => Err(self.changed("its last line is cut off")),
+            _ if crc != self.mark.crc => Err(self.changed("its checksum differs")),
             _ => Ok(None),
         }
-    }
-
-    fn fill(&mut self) -> Result<()> {
-        self.buffer.drain(..self.at);
-        self.at = 0;
-        let more = (self.mark.length - self.read.length).min(self.block as u64);
-        let kept = self.buffer.len();
-        let read = input::open(&self.path).and_then(|mut file: File| {
-            file.seek(SeekFrom::Start(self.read.length))?;
-            file.take(more).read_to_end(&mut self.buffer)
-        });
-        let count = read.map_err(|e| Error::Request(format!("cannot read {}: {e}", self.path.display())))?;
-        if (count as u64) < more {
-            return Err(self.changed(&format!("it ends after {} bytes", self.read.length + count as u64)));
-        }
-        self.read.length += more;
-        self.read.crc = crc32c::crc32c_append(self.read.crc, &self.buffer[kept..]);
-        Ok(())
     }
 
     /// What the next line is sorted by: its member, after the level in a table that has levels.
@@ -377,10 +370,6 @@ impl ShardRows {
             Some(key) => Ok(Some(key)),
             None => Err(self.changed(&format!("a row that is of no member of shard {shard}"))),
         }
-    }
-
-    fn line(&self) -> &[u8] {
-        &self.buffer[self.at..self.at + self.line]
     }
 }
 
@@ -421,7 +410,7 @@ pub fn join_rows(parts: &[FinishedShard], name: &str, out: &mut impl Write, targ
     }
     while let Some(Reverse((key, i))) = next.pop() {
         let rows = &mut all[i];
-        out.write_all(rows.line()).map_err(cannot)?;
+        out.write_all(&rows.line).map_err(cannot)?;
         match rows.key()? {
             Some(after) if after < key => {
                 return Err(rows.changed(&format!("member {} after {}", after.1, key.1)));
