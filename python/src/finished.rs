@@ -67,7 +67,7 @@ impl FinishedRun {
         let Some(picture) = all.into_iter().find(|picture| picture.name == place) else {
             return Err(Error::Request(format!("{place}: the run has no picture of this name, or its files are gone")));
         };
-        let print = Printer::default().read(&picture.figure.title, &picture.figure.svg, width)?;
+        let print = Printer::default().read(&picture.title, &picture.svg, width)?;
         Ok((print.file(format)?, missing_letters(&print.missing())))
     }
 }

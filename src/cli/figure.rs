@@ -10,7 +10,7 @@ use super::{
     print,
 };
 use crate::{
-    draw::{medium::Medium, plot::short},
+    draw::medium::Medium,
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
@@ -20,6 +20,7 @@ use crate::{
     },
     paper::{Printer, missing_letters},
     report::progress::Progress,
+    text::number,
 };
 
 const EXAMPLES: &str = "\
@@ -112,10 +113,10 @@ fn table(made: &[(&Figure, Ended)]) -> String {
     );
     for (figure, Ended { outcome, .. }) in made {
         let Figure { name, shape, flow, tau, times, redistribution, .. } = figure;
-        let (steps, t, end) = (outcome.steps, short(outcome.t_end), &outcome.end);
-        let omega = if *redistribution { short(OMEGA) } else { "none".into() };
-        let times = times.iter().map(|t| short(*t)).collect::<Vec<_>>().join(", ");
-        let run = format!("{name:<8}{shape:<13}{flow:<19}{POINTS:>5}{:>7}{omega:>7}{steps:>8}", short(*tau));
+        let (steps, t, end) = (outcome.steps, number(outcome.t_end), &outcome.end);
+        let omega = if *redistribution { number(OMEGA) } else { "none".into() };
+        let times = times.iter().map(|t| number(*t)).collect::<Vec<_>>().join(", ");
+        let run = format!("{name:<8}{shape:<13}{flow:<19}{POINTS:>5}{:>7}{omega:>7}{steps:>8}", number(*tau));
         let [length, area, excess, drift] = [end.length, end.area, end.excess, end.metric_drift];
         text += &format!("{run}{t:>7}{length:>9.5}{area:>9.5}{excess:>10.2e}{drift:>8.4}  {times}\n");
     }

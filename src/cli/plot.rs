@@ -75,7 +75,7 @@ impl Prints {
         }
         let printer = Printer::default();
         for picture in study.on_paper(self.width.pixels())? {
-            let made = self.of(&printer, (&picture.figure.title, &picture.figure.svg), &mut missing)?;
+            let made = self.of(&printer, (&picture.title, &picture.svg), &mut missing)?;
             for (extension, content) in made {
                 if let Some(name) = names::on_paper(picture.name, extension) {
                     files.push(folder.write(&name, content)?);

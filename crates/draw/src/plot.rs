@@ -8,6 +8,7 @@ use super::{
     style::sheet,
     svg::{Svg, closed_path, coordinate, dots},
 };
+use curvelax_base::text::number;
 use curvelax_curve::polygon;
 
 /// Maximum width of all panels together, and maximum height of one, in pixels.
@@ -89,7 +90,7 @@ impl PlottedCurve {
     /// A curve with nodes (x, y) at the time t, which is its label.
     pub fn at(t: f64, x: &[f64], y: &[f64]) -> PlottedCurve {
         let nodes = x.iter().zip(y).map(|(x, y)| DVec2::new(*x, *y)).collect();
-        PlottedCurve { label: format!("t = {}", short(t)), nodes }
+        PlottedCurve { label: format!("t = {}", number(t)), nodes }
     }
 }
 
@@ -219,11 +220,6 @@ impl Frame {
     }
 }
 
-/// Formats `value` as people write it: plain from 10⁻⁴, with a power of ten below.
-pub fn short(value: f64) -> String {
-    if value == 0.0 || value.abs() >= 1e-4 { value.to_string() } else { format!("{value:e}") }
-}
-
 #[cfg(test)]
 mod tests {
     use std::slice::from_ref;
@@ -256,7 +252,7 @@ mod tests {
 
     #[test]
     fn times_are_written_as_people_write_them() {
-        assert_eq!([0.0, 2.0, 0.17, 5e-4, 1e-6].map(short), ["0", "2", "0.17", "0.0005", "1e-6"]);
+        assert_eq!([0.0, 2.0, 0.17, 5e-4, 1e-6].map(number), ["0", "2", "0.17", "0.0005", "1e-6"]);
     }
 
     #[test]

@@ -11,9 +11,12 @@
 //! bounds the distance to sweeps of the default tolerance.
 
 use crate::report::progress::Progress;
-use curvelax_base::error::{Error, Result};
+use curvelax_base::{
+    error::{Error, Result},
+    text::{number, power_of_ten},
+};
 use curvelax_curve::Sampling;
-use curvelax_draw::plot::{Plot, PlotPanel, PlottedCurve, short};
+use curvelax_draw::plot::{Plot, PlotPanel, PlottedCurve};
 use curvelax_ensemble::{
     Cell, Ended, Family, Sink, Spec,
     request::spec::{BackendChoice, Precision, Solver},
@@ -189,18 +192,14 @@ impl Figure {
             Sampling::Points => "initial nodes given",
         };
         let redistribution = if self.redistribution { format!("ω = {OMEGA}") } else { "α = 0".into() };
-        format!("n = {POINTS}, τ = {}, {redistribution}, {nodes}, solved directly", superscript(&short(*tau)))
+        format!("n = {POINTS}, τ = {}, {redistribution}, {nodes}, solved directly", superscript(&number(*tau)))
     }
 }
 
 /// `10⁻⁶` for `1e-6`; other text unchanged.
 fn superscript(number: &str) -> String {
-    let raised =
-        |digit: char| char::to_digit(digit, 10).map(|d| ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize]);
-    match number.strip_prefix("1e-").map(|power| power.chars().map(raised).collect::<Option<String>>()) {
-        Some(Some(power)) => format!("10⁻{power}"),
-        _ => number.into(),
-    }
+    let power = number.strip_prefix('1').and_then(|rest| rest.strip_prefix('e')?.parse().ok());
+    power.map_or_else(|| number.into(), power_of_ten)
 }
 
 /// Stores the only member of a run.

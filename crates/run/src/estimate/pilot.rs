@@ -400,19 +400,20 @@ fn pilot(
 
 /// Bytes of the rows of a member that reaches the final time, the maximum over all cells.
 fn all_rows(cohort: &[Cell]) -> f64 {
-    let of_cell = |Cell { spec, family, .. }: &Cell| {
-        let series = spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0);
-        rows::bytes_of(series as usize, spec.snapshots.len(), family.points()) as f64
-    };
+    let of_cell =
+        |cell: &Cell| rows::bytes_of(series_of(cell) as usize, cell.spec.snapshots.len(), cell.family.points()) as f64;
     cohort.iter().map(of_cell).fold(0.0, f64::max)
 }
 
 /// Rows of the series and snapshots of a member that reaches the final time, the maximum over all cells.
 fn most_rows(cohort: &[Cell]) -> [f64; 2] {
-    let series =
-        cohort.iter().map(|Cell { spec, .. }| spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0));
     let snapshots = cohort.iter().map(|Cell { spec, .. }| spec.snapshots.len() as f64);
-    [series.fold(0.0, f64::max), snapshots.fold(0.0, f64::max)]
+    [cohort.iter().map(series_of).fold(0.0, f64::max), snapshots.fold(0.0, f64::max)]
+}
+
+/// Rows of the series of a member that reaches the final time.
+fn series_of(Cell { spec, .. }: &Cell) -> f64 {
+    spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0)
 }
 
 /// The cost of `all` members from that of the pilots, each scaled to its end.

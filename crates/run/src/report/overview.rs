@@ -4,7 +4,7 @@ use std::{fmt, path::Path, time::Duration};
 
 use super::words::{
     MAX_GROUP, chi, describe, errors, events, law, machine, member_name, member_time, paired, raw, significant, times,
-    unit, vanished, with_error,
+    unit, unit_in_title, vanished, with_error,
 };
 use curvelax_base::{
     error::shortened,
@@ -16,6 +16,7 @@ use curvelax_study::{
     placement::Platform,
     results::{
         cells::{CellStatistics, EnsembleStatistics, GroupStatistics, Rates},
+        comparison::CellComparison,
         shortfall::Shortfall,
         tally::Tally,
         times::TimeStatistics,
@@ -133,7 +134,7 @@ impl Overview<'_> {
     fn members(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let names: Vec<String> = self.tally.named.iter().map(|member| member_name(self.spec, member)).collect();
         let times: Vec<String> = self.tally.named.iter().map(member_time).collect();
-        let unit = self.spec.units.as_ref().map_or(String::new(), |units| format!(" ({})", units.shown().time));
+        let unit = unit_in_title(self.spec);
         let (time, error) = (self.statistics.time(), if self.statistics.of_limits { " ± t_error" } else { "" });
         let title = format!("{time}{error}{unit}");
         let wide = |all: &[String], title: &str| {
@@ -206,17 +207,8 @@ impl Overview<'_> {
             }
             events(self.spec, cell).try_for_each(|event| writeln!(f, "{:<11}{event}", ""))?;
         }
-        match cells.len().saturating_sub(MAX_CELLS) {
-            0 => {}
-            1 => writeln!(f, "{:<11}1 more cell is in {ENSEMBLE}", "...")?,
-            more => writeln!(f, "{:<11}{more} more cells are in {ENSEMBLE}", "...")?,
-        }
-        if let Some(test) = comparison.log_rank() {
-            writeln!(f, "{:<11}log-rank test that all cells have one distribution: {}", "cells", chi(test))?;
-        }
-        if let Some(why) = comparison.refusal() {
-            writeln!(f, "{:<11}not compared: {why}", "cells")?;
-        }
+        more(f, cells.len(), "cell", ENSEMBLE)?;
+        compared(f, comparison, "cells", "")?;
         self.pairs(f)?;
         for text in scaling.iter().flat_map(|of| law(of, self.statistics.time())) {
             writeln!(f, "{:<11}{text}", "law")?;
@@ -248,24 +240,9 @@ impl Overview<'_> {
             let (cell, times) = (cell(of.cell), times(self.statistics.times(of), self.limits_of(of), "relaxed"));
             writeln!(f, "{:<11}{property} {name}{cell}: {time} {}{times}", "group", unit(self.spec))?;
         }
-        match groups.len().saturating_sub(MAX_CELLS) {
-            0 => {}
-            1 => writeln!(f, "{:<11}1 more group is in {GROUPS}", "...")?,
-            more => writeln!(f, "{:<11}{more} more groups are in {GROUPS}", "...")?,
-        }
+        more(f, groups.len(), "group", GROUPS)?;
         for (rank, comparison) in (0..).zip(group_comparisons).take(MAX_CELLS) {
-            if let Some(test) = comparison.log_rank() {
-                writeln!(
-                    f,
-                    "{:<11}log-rank test that all groups have one distribution{}: {}",
-                    "groups",
-                    cell(rank),
-                    chi(test)
-                )?;
-            }
-            if let Some(why) = comparison.refusal() {
-                writeln!(f, "{:<11}not compared{}: {why}", "groups", cell(rank))?;
-            }
+            compared(f, comparison, "groups", &cell(rank))?;
         }
         writeln!(f)
     }
@@ -291,6 +268,23 @@ impl Overview<'_> {
             ),
         }
     }
+}
+
+/// Where those of `all` rows are that are not listed, if there are any.
+fn more(f: &mut fmt::Formatter, all: usize, one: &str, table: &str) -> fmt::Result {
+    match all.saturating_sub(MAX_CELLS) {
+        0 => Ok(()),
+        1 => writeln!(f, "{:<11}1 more {one} is in {table}", "..."),
+        more => writeln!(f, "{:<11}{more} more {one}s are in {table}", "..."),
+    }
+}
+
+/// Whether all of `what` could have one distribution, or why that is not known.
+fn compared(f: &mut fmt::Formatter, of: &CellComparison, what: &str, of_cell: &str) -> fmt::Result {
+    if let Some(test) = of.log_rank() {
+        writeln!(f, "{what:<11}log-rank test that all {what} have one distribution{of_cell}: {}", chi(test))?;
+    }
+    of.refusal().map_or(Ok(()), |why| writeln!(f, "{what:<11}not compared{of_cell}: {why}"))
 }
 
 #[cfg(test)]

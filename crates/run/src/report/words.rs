@@ -38,7 +38,7 @@ fn degrees(count: usize) -> String {
 
 /// Describes the run in one line, without the swept keys.
 pub fn describe(spec: &Spec) -> String {
-    let time = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().time));
+    let time = time_unit(spec);
     let pace = match spec.pace() {
         Pace::Fixed(Tau::Step(tau)) => ("tau", format!("tau = {tau:?}{time}")),
         Pace::Fixed(Tau::Auto) => ("tau", "tau = auto".into()),
@@ -147,6 +147,21 @@ pub(super) fn events<'a>(spec: &'a Spec, cell: &'a CellStatistics) -> impl Itera
         }
     };
     spec.event.iter().zip(&cell.events).map(line)
+}
+
+/// The unit behind a time; empty if it has no name.
+pub fn time_unit(spec: &Spec) -> String {
+    spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().time))
+}
+
+/// The unit behind a length; empty if it has no name.
+pub fn length_unit(spec: &Spec) -> String {
+    spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length))
+}
+
+/// The unit of times in the title of a column; empty if it has no name.
+pub(super) fn unit_in_title(spec: &Spec) -> String {
+    spec.units.as_ref().map_or(String::new(), |units| format!(" ({})", units.shown().time))
 }
 
 /// The unit of times, in front of them; empty if none was named.

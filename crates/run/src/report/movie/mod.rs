@@ -18,7 +18,7 @@ use glam::DVec2;
 use super::{
     members_layout::PanelLayout,
     page::spread,
-    words::{RAW_CLOCK, in_the_limit},
+    words::{RAW_CLOCK, in_the_limit, length_unit, time_unit},
 };
 use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
@@ -85,7 +85,7 @@ pub struct Movie {
     frame: DVec2,
     /// The bar that shows the scale, if all members have one: its length in pixels, and what is written next to it.
     bar: Option<(f64, String)>,
-    /// The unit of time; empty if it has no name.
+    /// The unit behind a time; empty if it has no name.
     unit: String,
     /// Whether members have limits, which the clock does not show.
     is_raw: bool,
@@ -124,7 +124,7 @@ impl Movie {
         let mut layout = PanelLayout::new(&known, side, PADDING, MIN_HEIGHT);
         layout.frame.y = layout.frame.y.ceil();
         let frame = layout.frame;
-        let length_unit = spec.units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length));
+        let (length_unit, unit) = (length_unit(spec), time_unit(spec));
         let names = |film: &Film, extent: DVec2| {
             let own = match layout.common {
                 Some(_) => film.name(MAX_NAME),
@@ -139,7 +139,6 @@ impl Movie {
         let pitch = frame + DVec2::new(GAP, lines * LINE + BELOW);
         let rows = films.len().div_ceil(columns);
 
-        let time_unit = spec.units.as_ref().map(|units| units.shown().time);
         let is_raw = films.iter().any(|film| t_limit(film.member).is_some());
         let panels = films.iter().zip(states).zip(boxes).enumerate().map(|(i, ((film, states), bounds))| {
             let place = DVec2::new((i % columns) as f64, (i / columns) as f64);
@@ -148,7 +147,6 @@ impl Movie {
             let pixel = layout.place((low, high), corner);
             let moved = states.into_iter().map(|nodes| nodes.into_iter().map(&pixel).collect());
             let frames = film.times.iter().copied().zip(moved).collect();
-            let unit = time_unit.as_ref().map_or(String::new(), |unit| format!(" {unit}"));
             let end = match (film.t_relax.filter(|_| film.status != Status::Vanished), t_limit(film.member)) {
                 (Some(t), Some(limit)) => (t, film.status.name().to_string() + &in_the_limit(limit, &unit)),
                 (Some(t), None) => (t, format!("{} at t = {}", film.status.name(), rounded(t, 3))),
@@ -172,7 +170,7 @@ impl Movie {
             size: DVec2::new(width, HEAD + rows as f64 * pitch.y + FOOT),
             frame,
             bar,
-            unit: time_unit.unwrap_or_default(),
+            unit,
             is_raw,
         })
     }
@@ -195,10 +193,7 @@ impl Movie {
             _ if t == 0.0 => write!(clock, "0"),
             _ => write!(clock, "{t:.3e}"),
         };
-        if !self.unit.is_empty() {
-            let _ = write!(clock, " {}", self.unit);
-        }
-        clock
+        clock + &self.unit
     }
 
     /// What the head says at its right: of the clock, if there is room, and of the grey line.
@@ -291,7 +286,7 @@ pub(super) mod tests {
         let mut clock = |end: f64, t: f64| {
             let nodes = vec![DVec2::ZERO, DVec2::X, DVec2::Y];
             movie.pace = MoviePace::new(&[MovedMember::new(Status::Relaxed, vec![(0.0, nodes.clone()), (end, nodes)])]);
-            movie.unit = if end > 1.0 { "h".into() } else { String::new() };
+            movie.unit = if end > 1.0 { " h".into() } else { String::new() };
             movie.clock(t)
         };
         assert_eq!([0.0, 0.01, 2.0].map(|t| clock(2.0, t)), ["t = 0.000 h", "t = 0.010 h", "t = 2.000 h"]);

@@ -64,7 +64,7 @@ impl Movie {
         svg.line(format_args!(
             "<animateTransform attributeName=\"transform\" type=\"translate\" calcMode=\"discrete\" \
              values=\"{positions}\" {}/>",
-            self.timing()
+            self.timing("")
         ));
         for (i, t) in times.into_iter().enumerate() {
             svg.text("clock", DVec2::new(0.0, 19.0 + CLOCK * i as f64), &self.clock(t));
@@ -87,7 +87,7 @@ impl Movie {
             svg.line(format_args!(
                 "<path class=\"moving\" fill-opacity=\"0\" d=\"{start}\">\n<animate attributeName=\"d\" \
                  values=\"{states}\" {}/>{filled}</path>",
-                self.timing_held()
+                self.timing(";1")
             ));
             svg.close();
         }
@@ -129,18 +129,10 @@ impl Movie {
         format!("dur=\"{}s\" repeatCount=\"indefinite\"", coordinate(self.seconds + HOLD))
     }
 
-    /// The attributes of an animation through all moments.
-    fn timing(&self) -> String {
-        format!("keyTimes=\"{}\" {}", self.key_times().join(";"), self.duration())
-    }
-
-    /// The same, with the last state once more at the end.
-    fn timing_held(&self) -> String {
-        format!("keyTimes=\"{};1\" {}", self.key_times().join(";"), self.duration())
-    }
-
-    fn key_times(&self) -> Vec<String> {
-        self.moments().map(|s| share(s * self.seconds / (self.seconds + HOLD))).collect()
+    /// The attributes of an animation through all moments, and `then` through further ones.
+    fn timing(&self, then: &str) -> String {
+        let times: Vec<String> = self.moments().map(|s| share(s * self.seconds / (self.seconds + HOLD))).collect();
+        format!("keyTimes=\"{}{then}\" {}", times.join(";"), self.duration())
     }
 }
 

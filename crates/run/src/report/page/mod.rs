@@ -33,20 +33,27 @@ const FEW_ROWS: usize = 3;
 const UNFOLDED: usize = 12;
 const NARROW: usize = 8;
 
-/// The content of a page.
+/// What a page says first.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Page<'a> {
+pub struct PageHead {
     /// Heading, and title of the window.
-    pub title: &'a str,
+    pub title: String,
     /// A sentence or two on what was run.
-    pub what: &'a str,
+    pub what: String,
     /// Members by status, such as `("relaxed", 412)`.
-    pub statuses: Vec<(&'a str, u64)>,
+    pub statuses: Vec<(&'static str, u64)>,
     /// Of those that vanished, the members that had relaxed.
     pub relaxed_before: u64,
     /// The numbers to read first: how long relaxation took.
     pub headline: Vec<Headline>,
-    /// They are those of members, in a list.
+}
+
+/// The content of a page.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Page<'a> {
+    /// What it says first.
+    pub head: PageHead,
+    /// The numbers to read first are those of members, in a list.
     pub is_list: bool,
     /// What the reader should know, one sentence each.
     pub warnings: &'a [String],
@@ -82,6 +89,8 @@ pub struct Headline {
 /// A picture.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PageFigure {
+    /// Its file in the folder of the run.
+    pub name: &'static str,
     /// Its title for screen readers; the picture shows it, too.
     pub title: String,
     /// A sentence below it; may be empty.
@@ -127,9 +136,9 @@ impl Page<'_> {
         ];
         let sections: Vec<_> = sections.into_iter().filter(|(.., content)| !content.is_empty()).collect();
 
-        let mut html = head(self.title, script.is_some(), &sheets.text());
-        html += &format!("<header>\n<h1>{}</h1>\n", escape(self.title));
-        html += &paragraph("what", self.what);
+        let mut html = head(&self.head.title, script.is_some(), &sheets.text());
+        html += &format!("<header>\n<h1>{}</h1>\n", escape(&self.head.title));
+        html += &paragraph("what", &self.head.what);
         let links = sections.iter().map(|(id, name, _)| format!("<li><a href=\"#{id}\">{name}</a></li>\n"));
         html += &format!(
             "<nav aria-label=\"Sections\">\n<ul>\n{}</ul>\n</nav>\n</header>\n<main>\n",
@@ -146,8 +155,8 @@ impl Page<'_> {
         let alone = if player.is_none() { " alone" } else { "" };
         let mut html = format!("<div class=\"first{alone}\">\n<div>\n");
         html += &section("How many relaxed", "", &self.counts());
-        if !self.headline.is_empty() {
-            let tiles: String = self.headline.iter().map(Headline::html).collect();
+        if !self.head.headline.is_empty() {
+            let tiles: String = self.head.headline.iter().map(Headline::html).collect();
             let class = if self.is_list { "headline list" } else { "headline" };
             html += &section("How long it took", "", &format!("<dl class=\"{class}\">\n{tiles}</dl>\n"));
         }
@@ -190,15 +199,15 @@ impl Page<'_> {
 
     /// Number of members with this status.
     fn with(&self, status: &str) -> u64 {
-        self.statuses.iter().filter(|(name, _)| *name == status).map(|(_, count)| count).sum()
+        self.head.statuses.iter().filter(|(name, _)| *name == status).map(|(_, count)| count).sum()
     }
 
     fn all(&self) -> u64 {
-        self.statuses.iter().map(|(_, count)| count).sum()
+        self.head.statuses.iter().map(|(_, count)| count).sum()
     }
 
     fn counts(&self) -> String {
-        let (relaxed, all) = (self.with("relaxed") + self.relaxed_before, self.all());
+        let (relaxed, all) = (self.with("relaxed") + self.head.relaxed_before, self.all());
         if all == 0 {
             return paragraph("relaxed-count", "There are no members.");
         }
@@ -208,7 +217,7 @@ impl Page<'_> {
             count(all, "member"),
             share(relaxed, all)
         );
-        let shown = || self.statuses.iter().filter(|(_, count)| *count > 0);
+        let shown = || self.head.statuses.iter().filter(|(_, count)| *count > 0);
         let bars = shown()
             .map(|(name, count)| format!("<span class=\"{}\" style=\"flex-grow: {count}\"></span>", colour(name)));
         html += &format!(
@@ -228,7 +237,7 @@ impl Page<'_> {
             return format!("<ul>\n{}</ul>\n", items.collect::<String>());
         }
         let [unfinished, relaxed, vanished] = ["unfinished", "relaxed", "vanished"].map(|status| self.with(status));
-        let (bad, relaxed) = (self.all() - unfinished - relaxed - vanished, relaxed + self.relaxed_before);
+        let (bad, relaxed) = (self.all() - unfinished - relaxed - vanished, relaxed + self.head.relaxed_before);
         paragraph(
             "",
             &match (bad, unfinished) {
@@ -256,6 +265,11 @@ impl Page<'_> {
 }
 
 impl Headline {
+    /// A number with its name and a note.
+    pub fn new(label: impl Into<String>, value: impl Into<String>, note: impl Into<String>) -> Headline {
+        Headline { label: label.into(), value: value.into(), note: note.into() }
+    }
+
     fn html(&self) -> String {
         let [label, value, note] = [&self.label, &self.value, &self.note].map(|text| escape(text));
         let note = if note.is_empty() { note } else { format!("<dd class=\"note\">{note}</dd>") };
@@ -303,14 +317,18 @@ impl PageTable {
         }
     }
 
+    /// What stands before its rows.
+    fn begin(&self, class: &str) -> String {
+        let (caption, note) = (escape(&self.caption), paragraph("small", &self.note));
+        format!(
+            "<div class=\"{class}\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
+             <p class=\"title\">{caption}</p>\n{note}<table>\n"
+        )
+    }
+
     /// A row for each column, and a column for each row.
     fn turned(&self) -> String {
-        let caption = escape(&self.caption);
-        let mut html = format!(
-            "<div class=\"table turned\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
-             <p class=\"title\">{caption}</p>\n{}<table>\n<tbody>\n",
-            paragraph("small", &self.note)
-        );
+        let mut html = self.begin("table turned") + "<tbody>\n";
         for (j, name) in self.header.iter().enumerate() {
             let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
             for row in &self.rows {
@@ -337,7 +355,6 @@ impl PageTable {
     }
 
     fn upright(&self) -> String {
-        let caption = escape(&self.caption);
         let columns = self.header.len();
         let cell = |row: &[String], j: usize| escape(row.get(j).map_or("", String::as_str));
         let is_number = |text: &str| text.is_empty() || number(text);
@@ -345,8 +362,7 @@ impl PageTable {
             (0..columns).map(|j| self.rows.iter().all(|row| row.get(j).is_none_or(|text| is_number(text)))).collect();
         let class = |j: usize| if numbers[j] { " class=\"number\"" } else { "" };
 
-        let mut html = begin_table(&caption, &paragraph("small", &self.note));
-        html += "<thead><tr>";
+        let mut html = self.begin("table") + "<thead><tr>";
         for j in 0..columns {
             let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
         }
@@ -372,13 +388,6 @@ fn number(text: &str) -> bool {
     let text = text.trim_start_matches("≥ ").replace('\u{2212}', "-");
     let mantissa = text.split_once("·10").map_or(&text[..], |(mantissa, _)| mantissa);
     mantissa.parse::<f64>().is_ok()
-}
-
-fn begin_table(caption: &str, note: &str) -> String {
-    format!(
-        "<div class=\"table\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
-         <p class=\"title\">{caption}</p>\n{note}<table>\n"
-    )
 }
 
 /// Everything up to the body.

@@ -59,7 +59,7 @@ fn page(warnings: &[String]) -> Page<'_> {
     let figure = |name: &&str| {
         let (_, svg) = pictures().iter().find(|(found, _)| found == name).unwrap();
         let caption = "Members without t_relax are censored at the end of the run.".into();
-        PageFigure { title: (*name).into(), caption, svg: svg.clone() }
+        PageFigure { name: "", title: (*name).into(), caption, svg: svg.clone() }
     };
     let headline = [
         ("median t_relax", "0.412 length⁴", "95 %: 0.407 to 0.418"),
@@ -69,12 +69,16 @@ fn page(warnings: &[String]) -> Page<'_> {
     let headline =
         headline.map(|(label, value, note)| Headline { label: label.into(), value: value.into(), note: note.into() });
     Page {
-        relaxed_before: 0,
+        head: PageHead {
+            title: "4096 perturbed ellipses under surface diffusion".into(),
+            what: "8 amplitudes from 0.01 to 0.2, 512 members each: ellipse:2,1, n = 100, adaptive 0.0001, t-end = 2, \
+                   seed 1."
+                .into(),
+            statuses: vec![("relaxed", 3996), ("unfinished", 88), ("singular", 4), ("nonfinite", 0), ("stalled", 8)],
+            relaxed_before: 0,
+            headline: headline.into(),
+        },
         clock: "",
-        title: "4096 perturbed ellipses under surface diffusion",
-        what: "8 amplitudes from 0.01 to 0.2, 512 members each: ellipse:2,1, n = 100, adaptive 0.0001, t-end = 2, seed 1.",
-        statuses: vec![("relaxed", 3996), ("unfinished", 88), ("singular", 4), ("nonfinite", 0), ("stalled", 8)],
-        headline: headline.into(),
         warnings,
         members: (0..6).map(member).collect(),
         is_list: false,
@@ -168,18 +172,20 @@ fn everything_is_escaped() {
     let warnings = [evil.to_owned()];
     let owned = || evil.to_owned();
     let html = Page {
-        relaxed_before: 0,
+        head: PageHead {
+            title: owned(),
+            what: owned(),
+            statuses: vec![(evil, 3)],
+            relaxed_before: 0,
+            headline: vec![Headline { label: owned(), value: owned(), note: owned() }],
+        },
         clock: "",
-        title: evil,
-        what: evil,
-        statuses: vec![(evil, 3)],
-        headline: vec![Headline { label: owned(), value: owned(), note: owned() }],
         warnings: &warnings,
         members: vec![MovingMember { label: owned(), ..member(0) }],
         is_list: false,
         units: Default::default(),
         legend: &[],
-        plots: vec![PageFigure { title: owned(), caption: owned(), svg: "<svg></svg>".into() }],
+        plots: vec![PageFigure { name: "", title: owned(), caption: owned(), svg: "<svg></svg>".into() }],
         tables: vec![PageTable {
             note: String::new(),
             caption: owned(),
@@ -198,12 +204,12 @@ fn everything_is_escaped() {
 
 #[test]
 fn an_empty_page_says_so_and_holds_no_number_that_is_none() {
-    let html = Page { relaxed_before: 0, title: "nothing", ..Page::default() }.html();
+    let html = Page { head: PageHead { title: "nothing".into(), ..PageHead::default() }, ..Page::default() }.html();
     assert!(is_well_formed(&html));
     assert!(html.contains("There are no members.") && html.contains("Nothing: there are no warnings."), "{html}");
     let statuses = vec![("relaxed", 0), ("unfinished", 1)];
     let censored = Page {
-        statuses,
+        head: PageHead { statuses, ..PageHead::default() },
         members: vec![MovingMember::default()],
         tables: vec![PageTable::default()],
         ..Page::default()
@@ -248,14 +254,17 @@ fn shares_are_0_and_100_only_where_they_are() {
 
 #[test]
 fn the_page_of_a_large_study_stays_small() {
-    let figure =
-        |(name, svg): &(String, String)| PageFigure { title: name.clone(), caption: name.clone(), svg: svg.clone() };
+    let figure = |(name, svg): &(String, String)| PageFigure {
+        name: "",
+        title: name.clone(),
+        caption: name.clone(),
+        svg: svg.clone(),
+    };
     let mut long = member(0);
     long.times = (0..200).map(f64::from).collect();
     long.nodes = vec![long.nodes[0].repeat(10); 200];
     let warnings = warnings();
     let html = Page {
-        relaxed_before: 0,
         members: vec![long; 8],
         plots: pictures().iter().map(figure).collect(),
         tables: vec![table(10_000); 10],

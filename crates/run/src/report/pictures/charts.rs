@@ -1,7 +1,10 @@
 //! The charts of a run, from its statistics.
 
-use super::{Chart, FinishedRun, cells::CellGroup, figure, tables::claims};
-use crate::report::{page::spread, words::member_name};
+use super::{FinishedRun, cells::CellGroup, figure, tables::claims};
+use crate::report::{
+    page::{PageFigure, spread},
+    words::member_name,
+};
 use curvelax_base::{error::Result, random::normal_quantile, text::significant};
 use curvelax_draw::{
     charts::{
@@ -42,7 +45,7 @@ impl FinishedRun<'_> {
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
-    pub fn charts(&self, medium: Medium) -> Result<Vec<Chart>> {
+    pub fn charts(&self, medium: Medium) -> Result<Vec<PageFigure>> {
         let key = &self.cell_key(medium == Medium::Page);
         if self.spec().names_members() {
             // A mean over outlines of unlike sizes would mean nothing.
@@ -66,7 +69,7 @@ impl FinishedRun<'_> {
         ChartText { title: title.into(), note, quantity, key: key.clone() }
     }
 
-    fn relaxation(&self, medium: Medium, key: &CellKey) -> Chart {
+    fn relaxation(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let cells = &self.statistics.cells;
         let times = cells.iter().map(|cell| CellValues {
             numbers: happened(&self.statistics.times(cell).sample, true).collect(),
@@ -86,11 +89,11 @@ impl FinishedRun<'_> {
             "Above: how many members{of_cells} relaxed at which {quantity}. Below: the share of them that had relaxed by \
              then."
         );
-        chart(names::RELAXATION, &title, &caption, svg)
+        figure(names::RELAXATION, &title, &caption, svg)
     }
 
     /// The times of each cell as a box, and their quantiles against those of two laws.
-    fn distribution(&self, medium: Medium, key: &CellKey) -> Chart {
+    fn distribution(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let cells = self.statistics.cells.iter().map(|cell| {
             let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
             let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
@@ -105,10 +108,10 @@ impl FinishedRun<'_> {
         let chart_of = TimeDistribution { text, keys: &self.keys(), cells: cells.collect() };
         let caption = "Above: the median, the middle half and the middle nine tenths of the members. Below, if known: \
                        quantiles of the times against a normal distribution, left, and of their logarithms, right.";
-        chart(names::DISTRIBUTION, &chart_of.text.title, caption, chart_of.draw(medium))
+        figure(names::DISTRIBUTION, &chart_of.text.title, caption, chart_of.draw(medium))
     }
 
-    fn survival(&self, medium: Medium, key: &CellKey) -> Chart {
+    fn survival(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let curves = self.statistics.cells.iter().map(|cell| survival_curve(&self.statistics.times(cell).sample));
         let text = self.text(medium, "Members not yet relaxed", &self.error(), key);
         let survival = Survival { text, curves: curves.collect(), ..Survival::default() };
@@ -116,7 +119,7 @@ impl FinishedRun<'_> {
     }
 
     /// The members not yet relaxed, by group of their outlines.
-    fn groups(&self, medium: Medium) -> Option<Chart> {
+    fn groups(&self, medium: Medium) -> Option<PageFigure> {
         let (key, all) = (self.spec().group_by.as_deref()?, &self.statistics.groups);
         let mut groups: Vec<&GroupStatistics> = all.iter().collect();
         if groups.len() > DISTINCT {
@@ -146,7 +149,7 @@ impl FinishedRun<'_> {
     }
 
     /// A survival curve for each event of each cell, if there are events.
-    fn events(&self, medium: Medium) -> Option<Chart> {
+    fn events(&self, medium: Medium) -> Option<PageFigure> {
         let spec = self.spec();
         if spec.event.is_empty() {
             return None;
@@ -177,11 +180,11 @@ impl FinishedRun<'_> {
             "Share of the members in which an event has not happened yet. {}",
             survival_caption(&survival, "that")
         );
-        Some(chart(names::EVENT_SURVIVAL, &survival.text.title, &caption, survival.draw(medium)))
+        Some(figure(names::EVENT_SURVIVAL, &survival.text.title, &caption, survival.draw(medium)))
     }
 
     /// The mean excess, for as long as all members of a cell are running.
-    fn excess(&self, medium: Medium, key: &CellKey) -> Result<Option<Chart>> {
+    fn excess(&self, medium: Medium, key: &CellKey) -> Result<Option<PageFigure>> {
         let curve = |(rank, cell): (usize, &CellTally)| {
             let all: u64 = cell.counts.iter().sum();
             // Rows are sorted by cell.
@@ -221,10 +224,10 @@ impl FinishedRun<'_> {
         let excess = excess.excess_in_words();
         let of_band = if decay.has_bands() { format!(" Band: {band}.") } else { String::new() };
         let caption = format!("How the excess, {excess}, falls{slope}.{of_band}");
-        Ok(Some(chart(names::EXCESS, title, &caption, decay.draw(medium))))
+        Ok(Some(figure(names::EXCESS, title, &caption, decay.draw(medium))))
     }
 
-    fn rates(&self, medium: Medium, key: &CellKey) -> Chart {
+    fn rates(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let EnsembleStatistics { cells, relative, .. } = self.statistics;
         let rates =
             cells.iter().map(|cell| CellValues { numbers: cell.rates.drawn.sorted().into(), members: cell.members() });
@@ -237,12 +240,12 @@ impl FinishedRun<'_> {
         let caption = format!(
             "Slope of the line through ln excess, while that falls from a tenth to a thousandth of its start{over}."
         );
-        chart(names::RATE, title, &caption, svg)
+        figure(names::RATE, title, &caption, svg)
     }
 
     /// The time against one swept key, with a series for each combination of the others: against the one that colours
     /// show, or that changes fastest.
-    fn dependence(&self, medium: Medium) -> Option<Chart> {
+    fn dependence(&self, medium: Medium) -> Option<PageFigure> {
         let axes = self.spec().sweep.axes();
         let across = self.two_axes().map_or(axes.len().checked_sub(1)?, |[colour, _]| colour);
         let axis = &axes[across];
@@ -311,7 +314,7 @@ impl FinishedRun<'_> {
                     .into()
             }
         };
-        Some(chart(names::DEPENDENCE, &title, &caption, chart_of.draw(medium)))
+        Some(figure(names::DEPENDENCE, &title, &caption, chart_of.draw(medium)))
     }
 
     /// The line of the power law of the medians, if one was fitted.
@@ -326,7 +329,7 @@ impl FinishedRun<'_> {
 
     /// The time against the features that explain it best. Flows and shapes have a panel each; cells that differ in a
     /// number have a colour each, and no R² over all of them.
-    fn features(&self, medium: Medium, key: &CellKey) -> Chart {
+    fn features(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let Explained { rows, features, pictured, drawn, times } = self.explained;
         let quantity = times.first().map_or("t_relax", String::as_str);
         let (groups, count) = (self.panel_groups(), self.panel_groups().len());
@@ -388,11 +391,11 @@ impl FinishedRun<'_> {
         let svg = Scatter { text, notes, cells, panels, reason: &reason }.draw(medium);
         let caption =
             format!("{quantity} against the features in members.csv that explain most of it by a straight line.");
-        chart(names::FEATURES, title, &caption, svg)
+        figure(names::FEATURES, title, &caption, svg)
     }
 
     /// The times of members that are known by name.
-    fn members(&self, medium: Medium) -> Chart {
+    fn members(&self, medium: Medium) -> PageFigure {
         let dot = |member: &MemberTime| {
             let (t, error) = member.shown().or(member.later_than.map(|t| (t, None)))?;
             let name = member_name(self.spec(), member);
@@ -407,10 +410,10 @@ impl FinishedRun<'_> {
         let caption = format!("Dot: {quantity} of a member.{bar}{open}");
         let text = self.text(medium, title, "", &CellKey::default());
         let svg = MemberTimes { text, names: "", members }.draw(medium);
-        chart(names::MEMBER_TIMES, title, &caption, svg)
+        figure(names::MEMBER_TIMES, title, &caption, svg)
     }
 
-    fn mesh(&self, medium: Medium) -> Chart {
+    fn mesh(&self, medium: Medium) -> PageFigure {
         let title = "Mesh quality at the end";
         let quality = MeshQuality {
             title,
@@ -420,12 +423,8 @@ impl FinishedRun<'_> {
             distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
-        chart(names::MESH, title, caption, quality.draw(medium))
+        figure(names::MESH, title, caption, quality.draw(medium))
     }
-}
-
-fn chart(name: &'static str, title: &str, caption: &str, svg: String) -> Chart {
-    Chart { name, figure: figure(title, caption, svg) }
 }
 
 /// The parts that are not empty, as one sentence.
@@ -434,8 +433,8 @@ fn joined(parts: [String; 2]) -> String {
 }
 
 /// Survival curves of relaxation times.
-fn survival_chart(name: &'static str, drawn: &Survival, medium: Medium) -> Chart {
-    chart(name, &drawn.text.title, &survival_caption(drawn, "it relaxed"), drawn.draw(medium))
+fn survival_chart(name: &'static str, drawn: &Survival, medium: Medium) -> PageFigure {
+    figure(name, &drawn.text.title, &survival_caption(drawn, "it relaxed"), drawn.draw(medium))
 }
 
 /// What a survival curve is, as far as it is drawn; a stroke is a member that ended before `what`.

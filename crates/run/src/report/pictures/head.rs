@@ -1,9 +1,9 @@
 //! What a page says first: title, what was run, and the numbers to read first.
 
-use super::{DIGITS, FinishedRun, MAX_NAME, PageHead};
+use super::{DIGITS, FinishedRun, MAX_NAME};
 use crate::report::{
-    page::Headline,
-    words::{describe, member_name, member_time},
+    page::{Headline, PageHead},
+    words::{describe, member_name, member_time, time_unit},
 };
 use curvelax_base::{
     error::shortened,
@@ -57,16 +57,6 @@ impl FinishedRun<'_> {
             ),
             false => format!("Times are {unit}."),
         }
-    }
-
-    /// The unit behind a time, if it has a name.
-    pub(super) fn time_unit(&self) -> String {
-        self.spec().units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().time))
-    }
-
-    /// The unit behind a length, if it has a name.
-    pub(super) fn length_unit(&self) -> String {
-        self.spec().units.as_ref().map_or(String::new(), |units| format!(" {}", units.shown().length))
     }
 
     /// What ran, for the window and the heading: shape, flow and the swept keys.
@@ -147,7 +137,7 @@ impl FinishedRun<'_> {
                 let range = [f64::min, f64::max].map(|of| medians.iter().copied().reduce(of));
                 let shown = match range {
                     [Some(low), Some(high)] => {
-                        format!("{} to {}{}", significant(low, 3), significant(high, 3), self.time_unit())
+                        format!("{} to {}{}", significant(low, 3), significant(high, 3), time_unit(self.spec()))
                     }
                     _ => "not reached".into(),
                 };
@@ -155,39 +145,37 @@ impl FinishedRun<'_> {
                     (known, all) if known < all => format!("over {known} of {all} cells; the others have no median"),
                     (_, all) => format!("over {all} cells"),
                 };
-                headline.push(Headline { label: format!("median {}", self.statistics.time()), value: shown, note });
+                headline.push(Headline::new(format!("median {}", self.statistics.time()), shown, note));
                 headline.extend(scaling.as_ref().and_then(power));
                 headline.extend(compared(comparison));
             }
         }
         let finer = self.tally.nodes.counted();
-        headline.extend(finer.map(|(value, note)| Headline { label: "with more nodes".into(), value, note }));
+        headline.extend(finer.map(|(value, note)| Headline::new("with more nodes", value, note)));
         headline
     }
 
     /// A member that is known by name.
     fn of_member(&self, member: &MemberTime) -> Headline {
-        let value = format!("{}{}", member_time(member), self.time_unit());
+        let value = format!("{}{}", member_time(member), time_unit(self.spec()));
         let time = if member.t_limit.is_some() { "t_limit" } else { "t_relax" };
         let (label, status) = (member_name(self.spec(), member), member.status.name());
-        Headline { label, value: format!("{time} = {value}").replace("= >", ">"), note: status.into() }
+        Headline::new(label, format!("{time} = {value}").replace("= >", ">"), status)
     }
 
     /// The only cell.
     fn of_cell(&self, cell: &CellStatistics) -> Vec<Headline> {
-        let (time, times, unit) = (self.statistics.time(), self.statistics.times(cell), self.time_unit());
+        let (time, times, unit) = (self.statistics.time(), self.statistics.times(cell), time_unit(self.spec()));
         let shown =
             |value: Option<f64>| value.map_or("not reached".into(), |t| format!("{}{unit}", significant(t, DIGITS)));
-        let tile =
-            |label: &str, value: Option<f64>, note: String| Headline { label: label.into(), value: shown(value), note };
+        let tile = |label: &str, value: Option<f64>, note: String| Headline::new(label, shown(value), note);
         let told = |interval: Interval| interval.in_short(|end| significant(end, DIGITS)) + &unit;
         let vanished = Some(&cell.vanishing).filter(|of| of.stopped == 0 && of.times.sample.events() > 0);
         let vanished = vanished
             .map(|of| (if of.limits.is_some() { "median t_vanish_limit" } else { "median t_vanish" }, of.judged()))
             .map(|(name, of)| tile(name, of.median(), of.interval().map_or(String::new(), told)));
         if times.sample.events() == 0 {
-            let none = Headline { label: time.into(), value: "not reached".into(), note: "by any member".into() };
-            return [none].into_iter().chain(vanished).collect();
+            return [Headline::new(time, "not reached", "by any member")].into_iter().chain(vanished).collect();
         }
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
@@ -203,7 +191,7 @@ impl FinishedRun<'_> {
         ];
         if let [Some(low), .., Some(high)] = times.quantiles {
             let value = format!("{} to {}{unit}", significant(low, 3), significant(high, 3));
-            headline.push(Headline { label: "nine in ten".into(), value, note: format!("{time}, 5 to 95 %") });
+            headline.push(Headline::new("nine in ten", value, format!("{time}, 5 to 95 %")));
         }
         headline.extend(if self.statistics.of_limits { self.behind(cell) } else { discretisation(cell) });
         headline.extend(vanished);
@@ -212,20 +200,17 @@ impl FinishedRun<'_> {
 
     /// What stands behind the limits of a cell.
     fn behind(&self, cell: &CellStatistics) -> Vec<Headline> {
-        let (unit, open) = (self.time_unit(), cell.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
-        let error = cell.limits.as_ref().and_then(|limits| limits.error).map(|error| Headline {
-            label: "median t_error".into(),
-            value: format!("{}{unit}", significant(error, 2)),
-            note: match open {
-                0 => "half-width of the 95 % interval of each t_limit".into(),
-                _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
-            },
-        });
-        let raw = cell.median().map(|median| Headline {
-            label: "raw median t_relax".into(),
-            value: format!("{}{unit}", significant(median, DIGITS)),
-            note: format!("at n = {}", self.spec().points),
-        });
+        let (unit, open) =
+            (time_unit(self.spec()), cell.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
+        let bound = match open {
+            0 => "half-width of the 95 % interval of each t_limit".into(),
+            _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
+        };
+        let shown = |value: f64, digits: usize| format!("{}{unit}", significant(value, digits));
+        let error = cell.limits.as_ref().and_then(|limits| limits.error);
+        let error = error.map(|error| Headline::new("median t_error", shown(error, 2), bound));
+        let nodes = format!("at n = {}", self.spec().points);
+        let raw = cell.median().map(|median| Headline::new("raw median t_relax", shown(median, DIGITS), nodes));
         error.into_iter().chain(raw).collect()
     }
 }
@@ -245,7 +230,7 @@ fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
         true => (format!("{mean} %"), format!("± {error} % of t_relax, estimated from {known}")),
         false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
     };
-    vec![Headline { label: "discretisation error".into(), value, note }]
+    vec![Headline::new("discretisation error", value, note)]
 }
 
 /// The power law of the medians, in the headline.
@@ -257,12 +242,12 @@ fn power(of: &Scaling) -> Option<Headline> {
         false => format!("χ² allows it, {}", p_value(goodness.p_value)),
     });
     let note = error.into_iter().chain(fit).collect::<Vec<_>>().join("; ");
-    Some(Headline { label: format!("power of {}", of.scale), value: significant(law.exponent, 3), note })
+    Some(Headline::new(format!("power of {}", of.scale), significant(law.exponent, 3), note))
 }
 
 /// Whether the cells differ, in the headline.
 fn compared(comparison: &CellComparison) -> Option<Headline> {
-    let of = |value: String, note: String| Some(Headline { label: "one distribution?".into(), value, note });
+    let of = |value: String, note: String| Some(Headline::new("one distribution?", value, note));
     match comparison {
         CellComparison::Single => None,
         CellComparison::LogRank(test) => of(p_value(test.p_value), "log-rank test over all cells".into()),

@@ -7,8 +7,8 @@ mod tables;
 
 use super::{
     gallery::{self, Wording},
-    page::{Headline, MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
-    words::{RAW_CLOCK, in_the_limit, place},
+    page::{MAX_MEMBERS, MovingMember, Page, PageFigure, spread},
+    words::{RAW_CLOCK, in_the_limit, length_unit, place, time_unit},
 };
 use glam::DVec2;
 
@@ -45,39 +45,15 @@ pub struct FinishedRun<'a> {
     pub films: &'a [Film],
 }
 
-/// What a page says first: the fields of [`Page`] of the same names.
-pub struct PageHead {
-    /// Heading.
-    pub title: String,
-    /// What was run.
-    pub what: String,
-    /// Members by status.
-    pub statuses: Vec<(&'static str, u64)>,
-    /// Of those that vanished, the members that had relaxed.
-    pub relaxed_before: u64,
-    /// The numbers to read first.
-    pub headline: Vec<Headline>,
-}
-
-/// A picture, and its place in the folder of the run.
-pub struct Chart {
-    /// The file.
-    pub name: &'static str,
-    /// The picture, with its text.
-    pub figure: PageFigure,
-}
-
 impl FinishedRun<'_> {
     /// The pictures for white paper so many pixels wide, without what a caption says.
     ///
     /// # Errors
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit the spec.
-    pub fn on_paper(&self, width: f64) -> Result<Vec<Chart>> {
+    pub fn on_paper(&self, width: f64) -> Result<Vec<PageFigure>> {
         let medium = Medium::Paper(width);
-        let gallery = self.gallery(medium).map(|svg| Chart { name: names::CURVES, figure: first_members(svg) });
-        let mut all: Vec<Chart> = self.charts(medium)?.into_iter().chain(gallery).collect();
-        all.iter_mut().for_each(|chart| chart.figure.svg = self.with_unit(std::mem::take(&mut chart.figure.svg)));
-        Ok(all)
+        let all = self.charts(medium)?.into_iter().chain(self.gallery(medium).map(first_members));
+        Ok(all.map(|figure| PageFigure { svg: self.with_unit(figure.svg), ..figure }).collect())
     }
 
     /// The first members, if there are portraits of them.
@@ -87,9 +63,9 @@ impl FinishedRun<'_> {
 
     /// The files that are drawn: name and text.
     pub fn pictures(&self) -> Result<Vec<(&'static str, String)>> {
-        let page = self.page(&self.charts(Medium::Page)?)?;
+        let page = self.page()?;
         let gallery = self.gallery(Medium::Screen);
-        let charts = self.charts(Medium::Screen)?.into_iter().map(|chart| (chart.name, chart.figure.svg));
+        let charts = self.charts(Medium::Screen)?.into_iter().map(|chart| (chart.name, chart.svg));
         let gallery = gallery.map(|svg| (names::CURVES, svg));
         let all = charts.chain(gallery).chain([(names::REPORT, page)]);
         Ok(all.map(|(name, text)| (name, self.with_unit(text))).collect())
@@ -109,24 +85,19 @@ impl FinishedRun<'_> {
     }
 
     /// The text of `report.html`.
-    fn page(&self, charts: &[Chart]) -> Result<String> {
+    fn page(&self) -> Result<String> {
         // Equal results give equal bytes, on any number of threads.
         let spec = Spec { threads: None, ..self.spec().clone() }.to_toml()?;
         let first = self.gallery(Medium::Page).map(first_members);
-        let PageHead { title, what, statuses, relaxed_before, headline } = self.head();
         let page = Page {
-            title: &title,
-            what: &what,
-            statuses,
-            relaxed_before,
+            head: self.head(),
             is_list: self.spec().names_members(),
-            headline,
             warnings: &self.provenance.warnings,
             members: self.trajectories(),
             clock: if self.statistics.of_limits { RAW_CLOCK } else { "" },
-            units: [self.length_unit(), self.time_unit()],
+            units: [length_unit(self.spec()), time_unit(self.spec())],
             legend: &self.legend(),
-            plots: charts.iter().map(|chart| chart.figure.clone()).chain(first).collect(),
+            plots: self.charts(Medium::Page)?.into_iter().chain(first).collect(),
             tables: self.tables(),
             spec: &spec,
             provenance: self.provenance(),
@@ -136,7 +107,7 @@ impl FinishedRun<'_> {
 
     /// How and when a member ended; when it relaxed is said in the limit, if that is known.
     fn end_of(&self, film: &Film) -> String {
-        let (unit, member) = (self.time_unit(), self.tally.named(film.member));
+        let (unit, member) = (time_unit(self.spec()), self.tally.named(film.member));
         let at = |t: f64| format!(" at t = {}{unit}", significant(t, 3));
         let when = match film.status {
             Status::Vanished => member.and_then(|member| member.t_vanish).map(at),
@@ -153,7 +124,7 @@ impl FinishedRun<'_> {
         let cells = distinct(&cells, gallery::SIZE, side);
         let ends = self.films.iter().map(|film| self.end_of(film));
         let rests = self.films.iter().map(|film| self.at_rest(film).unwrap_or_default());
-        Wording { unit: self.length_unit(), cells, ends: ends.collect(), rests: rests.collect() }
+        Wording { unit: length_unit(self.spec()), cells, ends: ends.collect(), rests: rests.collect() }
     }
 
     /// The Wulff shape of the last state of a crystal.
@@ -204,11 +175,11 @@ impl FinishedRun<'_> {
 /// The gallery with its words.
 fn first_members(svg: String) -> PageFigure {
     let caption = "Grey: the start. Light: in between. Colour: the last state, by status.";
-    figure("The first members before, during and after", caption, svg)
+    figure(names::CURVES, "The first members before, during and after", caption, svg)
 }
 
-fn figure(title: &str, caption: &str, svg: String) -> PageFigure {
-    PageFigure { title: title.into(), caption: caption.into(), svg }
+fn figure(name: &'static str, title: &str, caption: &str, svg: String) -> PageFigure {
+    PageFigure { name, title: title.into(), caption: caption.into(), svg }
 }
 
 #[cfg(test)]

@@ -1,9 +1,12 @@
 //! The tables of a page.
 
 use super::{DIGITS, FinishedRun};
-use crate::report::{page::PageTable, words::member_name};
+use crate::report::{
+    page::PageTable,
+    words::{member_name, time_unit, unit_in_title},
+};
 use curvelax_base::text::{p_value, significant};
-use curvelax_ensemble::{Event, Spec, Status};
+use curvelax_ensemble::{Event, Status};
 use curvelax_files::names;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
@@ -32,19 +35,17 @@ impl FinishedRun<'_> {
 
     /// Each member that is known by name.
     fn member_table(&self) -> PageTable {
-        let Spec { units, event, .. } = self.spec();
-        let unit = units.as_ref().map_or(String::new(), |units| format!(" ({})", units.shown().time));
+        let (event, unit) = (&self.spec().event, unit_in_title(self.spec()));
         let times = ["t_limit", "± t_error", "t_relax", "t_vanish_limit", "± t_vanish_error", "t_vanish"];
         let header = ["member", "name", "status"].into_iter().chain(times).map(String::from);
         let events = event.iter().map(|event| event.name.clone());
         let header = header.chain(events).enumerate().map(|(i, name)| if i > 2 { name + &unit } else { name });
-        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, MEMBER_DIGITS));
+        let [shown, half] = [MEMBER_DIGITS, 2].map(known);
         let row = |member: &MemberTime| {
             let MemberTime { t_limit, t_error, t_relax, t_vanish, vanishing, events, .. } = member;
-            let half = |error: Option<f64>| error.map_or(String::new(), |error| significant(error, 2));
             let times = [shown(*t_limit), half(*t_error), shown(*t_relax)].into_iter();
             let gone = [shown(vanishing.map(|(t, _)| t)), half(vanishing.map(|(_, error)| error)), shown(*t_vanish)];
-            let times = times.chain(gone).chain(events.iter().copied().map(shown));
+            let times = times.chain(gone).chain(events.iter().copied().map(&shown));
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
         };
@@ -52,10 +53,10 @@ impl FinishedRun<'_> {
         let raw = if self.statistics.of_limits { &of_run } else { "" };
         PageTable {
             caption: format!("Each member{raw}"),
-            note: String::new(),
             header: header.collect(),
             rows: self.tally.named.iter().map(row).collect(),
             source: names::SUMMARY.into(),
+            ..PageTable::default()
         }
         .without_empty_columns()
     }
@@ -63,7 +64,7 @@ impl FinishedRun<'_> {
     fn table(&self) -> PageTable {
         let keys = self.spec().sweep.axes().iter().map(|axis| axis.key.clone());
         let rows = self.statistics.cells.iter().map(|cell| (&cell.values[..], cell));
-        let unit = self.time_unit();
+        let unit = time_unit(self.spec());
         let unit = if unit.is_empty() { unit } else { format!(" in{unit}") };
         let time = self.statistics.time();
         let caption = format!("Members by status, statistics of {time}{unit} (Kaplan-Meier), and rates of decay");
@@ -104,19 +105,13 @@ impl FinishedRun<'_> {
         let header = ["cell", "event", "condition", "seen", "censored", "mean", "standard error"];
         let header =
             header.into_iter().chain(QUANTILES.map(|(_, name, _)| name)).chain(["discretisation %", "raw median"]);
-        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
         let row = |cell: u64, event: &Event, of: &EventStatistics| {
-            let (TimeStatistics { mean, quantiles, .. }, sample) = (of.judged(), &of.times.sample);
-            let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
-            let moments = [
-                mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
-                mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
-            ];
+            let sample = &of.times.sample;
             let counts = [sample.events(), sample.censored()].map(|count| count.to_string());
             let percent = of.discretisation.as_ref().filter(|_| of.limits.is_none()).map(|error| 100.0 * error.mean);
             let raw = of.limits.as_ref().and_then(|_| of.times.median());
             let start = [cell.to_string(), event.name.clone(), event.condition.to_string()].into_iter().chain(counts);
-            start.chain(moments).chain(quantiles.map(shown)).chain([shown(percent), shown(raw)]).collect()
+            start.chain(times(of.judged())).chain([percent, raw].map(known(DIGITS))).collect()
         };
         let cells = self.statistics.cells.iter();
         let rows = cells
@@ -129,14 +124,13 @@ impl FinishedRun<'_> {
             header: header.map(String::from).collect(),
             rows: rows.collect(),
             source: names::EVENT_STATISTICS.into(),
-            note: String::new(),
+            ..PageTable::default()
         })
     }
 
     /// The differences from the first cell, if cells share their random numbers.
     fn pairs(&self) -> Option<PageTable> {
         let cells = self.statistics.comparison.paired_cells()?;
-        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
         let row = |of: &CellDifference| {
             let [low, high] = of.interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
             let name = self.spec().sweep.name(of.cell);
@@ -144,7 +138,7 @@ impl FinishedRun<'_> {
             let counts = [of.pairs, of.equal].map(|count| count.to_string());
             let left_out = [of.left_out.later, of.left_out.earlier, of.left_out.unknown].map(|count| count.to_string());
             let start = [of.cell.to_string(), name].into_iter().chain(counts);
-            start.chain([of.median, low, high].map(shown)).chain([p]).chain(left_out).collect()
+            start.chain([of.median, low, high].map(known(DIGITS))).chain([p]).chain(left_out).collect()
         };
         let header = ["cell", "values", "pairs", "equal", "median", "95 % from", "to", "signed ranks"];
         let left_out = ["left out: later", "earlier", "unknown"];
@@ -156,8 +150,7 @@ impl FinishedRun<'_> {
             ),
             header: header.into_iter().chain(left_out).map(String::from).collect(),
             rows: cells.iter().map(row).collect(),
-            source: String::new(),
-            note: String::new(),
+            ..PageTable::default()
         })
     }
 
@@ -170,7 +163,6 @@ impl FinishedRun<'_> {
     /// The best features of each time, cell by cell, and the regression on some.
     fn explanation(&self) -> Option<PageTable> {
         let rows = &self.explained.rows;
-        let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, 3));
         let row = |of: &ExplainedRow| {
             let feature = match (&*of.feature, of.chosen) {
                 (TOGETHER, Some(chosen)) => format!("{chosen} together"),
@@ -179,7 +171,7 @@ impl FinishedRun<'_> {
             let counts = [of.members, of.censored].map(|count| count.to_string());
             let chosen = of.chosen.filter(|_| of.feature != TOGETHER).map_or(String::new(), |place| place.to_string());
             let start = [self.cell_name(of.cell), of.time.clone(), feature].into_iter().chain(counts);
-            start.chain([shown(of.spearman), shown(of.r2), chosen]).collect()
+            start.chain([of.spearman, of.r2].map(known(3))).chain([chosen]).collect()
         };
         // The rows of a cell and a time are sorted, with the regression at the end.
         let groups = rows.chunk_by(|a, b| (a.cell, &a.time) == (b.cell, &b.time));
@@ -220,36 +212,41 @@ impl FinishedRun<'_> {
         let numbers = numbers.chain(["median rate", "over theory", "discretisation %"]).chain(raw);
         let header = ["cell".to_string()].into_iter().chain(keys).chain(statuses).chain(numbers.map(String::from));
         let row = |(values, cell): (&[String], &CellStatistics)| {
-            let shown = |value: Option<f64>| value.map_or(String::new(), |value| significant(value, DIGITS));
-            let times = self.statistics.times(cell);
-            let mean = times.mean;
-            let least = if mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
-            let moments = [
-                mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS))),
-                mean.and_then(|mean| mean.standard_error).map_or(String::new(), |error| significant(error, 2)),
-            ];
-            let quantiles = times.quantiles.map(shown);
             let counts = cell.counts.iter().map(u64::to_string);
             let start = [cell.cell.to_string()].into_iter().chain(values.iter().cloned());
-            let rates = ["median", "ratio"].map(|name| shown(cell.rates.numbers.get(name)));
+            let rates = ["median", "ratio"].map(|name| cell.rates.numbers.get(name));
             let of_limits = self.statistics.of_limits;
-            let known = cell.discretisation.as_ref().filter(|error| error.converges() && !of_limits);
-            let percent = known.map(|error| 100.0 * error.mean);
+            let error = cell.discretisation.as_ref().filter(|error| error.converges() && !of_limits);
+            let percent = error.map(|error| 100.0 * error.mean);
             let limits = cell.limits.as_ref().filter(|_| of_limits);
             let raw = limits.and_then(|_| cell.median());
             let vanishing = &cell.vanishing;
             let gone = [vanishing.times.median(), vanishing.limits.as_ref().and_then(|of| of.times.median())];
-            let errors = [percent, limits.and_then(|limits| limits.error), raw].into_iter().chain(gone).map(shown);
-            start.chain(counts).chain(moments).chain(quantiles).chain(rates).chain(errors).collect()
+            let errors = [percent, limits.and_then(|limits| limits.error), raw];
+            let numbers = rates.into_iter().chain(errors).chain(gone).map(known(DIGITS));
+            start.chain(counts).chain(times(self.statistics.times(cell))).chain(numbers).collect()
         };
         PageTable {
             caption: caption.into(),
             header: header.collect(),
             rows: rows.map(row).collect(),
             source: source.into(),
-            note: String::new(),
+            ..PageTable::default()
         }
     }
+}
+
+/// Writes a number to so many digits, and nothing where none is known.
+fn known(digits: usize) -> impl Fn(Option<f64>) -> String {
+    move |value| value.map_or(String::new(), |value| significant(value, digits))
+}
+
+/// Mean, standard error and quantiles of some times; the mean is a lower bound if members had not ended.
+fn times(of: &TimeStatistics) -> impl Iterator<Item = String> {
+    let least = if of.mean.is_some_and(|mean| mean.restricted_to.is_some()) { "≥ " } else { "" };
+    let mean = of.mean.map_or(String::new(), |mean| format!("{least}{}", significant(mean.value, DIGITS)));
+    let error = known(2)(of.mean.and_then(|mean| mean.standard_error));
+    [mean, error].into_iter().chain(of.quantiles.map(known(DIGITS)))
 }
 
 /// When nothing is said about a time.
