@@ -29,8 +29,6 @@ pub struct Decay<'a> {
     pub curves: Vec<DecayCurve>,
     /// Theoretical lines to compare with.
     pub theory: Vec<Theory>,
-    /// Scale of time: linear for exponential decay, logarithmic for an algebraic law.
-    pub time: Option<Scale>,
 }
 
 /// The mean excess of one cell.
@@ -85,9 +83,8 @@ impl DecayLaw {
 
     /// Path data of its line across a panel.
     fn line(self, panel: &Panel) -> String {
-        let (scale, (first, last)) = (panel.x.scale(), panel.x.range());
-        let [first, last] = [first, last].map(|t| scale.level(t));
-        let times = (0..=PIECES).map(|i| scale.value(first + (last - first) * f64::from(i) / f64::from(PIECES)));
+        let (first, last) = panel.x.range();
+        let times = (0..=PIECES).map(|i| first + (last - first) * f64::from(i) / f64::from(PIECES));
         panel.clipped(&panel.points(times.map(|t| (t, self.at(t)))))
     }
 }
@@ -108,9 +105,13 @@ impl Decay<'_> {
         let colours = Colours::of(curves.len(), &text.key);
         let mut heading = text.heading([colours.sentence(curves.len())]);
         let times = || curves.iter().flat_map(|curve| curve.t.iter().copied());
-        let scale = self.time.filter(|scale| times().any(|t| scale.holds(t))).unwrap_or(Scale::Linear);
         let drawn = |curve: &DecayCurve| {
-            curve.t.iter().zip(&curve.mean).filter(|(t, mean)| scale.holds(**t) && Scale::Log.holds(**mean)).count()
+            curve
+                .t
+                .iter()
+                .zip(&curve.mean)
+                .filter(|(t, mean)| Scale::Linear.holds(**t) && Scale::Log.holds(**mean))
+                .count()
         };
         match curves.iter().map(drawn).max() {
             None | Some(0) => return heading.nothing(medium, "There is no positive mean excess to draw."),
@@ -124,7 +125,7 @@ impl Decay<'_> {
         heading.legend = self.legend(&colours, bands);
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
-        let across = Axis::over("t", TIME, scale, times()).with_zero();
+        let across = Axis::over("t", TIME, Scale::Linear, times()).with_zero();
         let upwards = self.excess(bands);
         let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
         panel.draw(&mut svg);

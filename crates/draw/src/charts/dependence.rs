@@ -40,10 +40,6 @@ pub struct Dependence<'a> {
     pub key: &'a str,
     /// One series, or one per setting of the other keys.
     pub series: Vec<Series>,
-    /// Scale of a numeric key; by default that of [`Scale::of`], or logarithmic if there is a power law.
-    pub across: Option<Scale>,
-    /// Scale of t_relax; the same default.
-    pub time: Option<Scale>,
 }
 
 /// t_relax at all settings of the key.
@@ -205,18 +201,16 @@ impl Dependence<'_> {
         }
     }
 
-    /// The scale: `preferred` if all values allow it.
-    fn scale(&self, preferred: Option<Scale>, values: &[f64]) -> Scale {
+    /// The scale of an axis of these values: logarithmic if there is a power law, where all values allow it.
+    fn scale(&self, values: &[f64]) -> Scale {
         let fitted = self.series.iter().any(|series| series.law().is_some());
-        let default = if fitted { Scale::Log } else { Scale::of(values.iter().copied()) };
-        Some(preferred.unwrap_or(default))
-            .filter(|scale| values.iter().all(|v| scale.holds(*v)))
-            .unwrap_or(Scale::Linear)
+        let scale = if fitted { Scale::Log } else { Scale::of(values.iter().copied()) };
+        if values.iter().all(|v| scale.holds(*v)) { scale } else { Scale::Linear }
     }
 
     fn time_axis(&self) -> Axis {
         let times: Vec<f64> = self.levels().flat_map(DependencePoint::times).collect();
-        let axis = Axis::over(&self.text.quantity, TIME, self.scale(self.time, &times), times.iter().copied());
+        let axis = Axis::over(&self.text.quantity, TIME, self.scale(&times), times.iter().copied());
         match range(times) {
             Some((low, high)) if low >= 0.0 && low < 0.5 * high => axis.with_zero(),
             _ => axis,
@@ -225,7 +219,7 @@ impl Dependence<'_> {
 
     fn draw_numeric(&self, medium: Medium, colours: &Colours, heading: &Heading) -> String {
         let settings: Vec<f64> = self.levels().filter_map(DependencePoint::number).collect();
-        let across = Axis::over(self.key, "", self.scale(self.across, &settings), settings);
+        let across = Axis::over(self.key, "", self.scale(&settings), settings);
         let time = self.time_axis();
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
         let panel = only_panel(&svg, [&across, &time], top, HEIGHT, colours.room(HEIGHT));

@@ -2,7 +2,7 @@
 
 use std::sync::OnceLock;
 
-use crate::{axis::Scale, charts::*, medium::Medium};
+use crate::{charts::*, medium::Medium};
 use curvelax_base::interval::Interval;
 
 /// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
@@ -151,58 +151,58 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     let growing =
         |cells: usize| key((0..40).cycle().take(cells).map(|i| (format!("{:.3}", amplitude(i)), amplitude(i))));
     let share = |key: CellKey| text("Share that has not relaxed", "t", key);
-    let survive = |curves: Vec<SurvivalCurve>, time: Option<Scale>| {
+    let survive = |curves: Vec<SurvivalCurve>| {
         let text = share(growing(curves.len()));
-        Survival { text, curves, time, ..Survival::default() }.draw(medium)
+        Survival { text, curves, ..Survival::default() }.draw(medium)
     };
     let cells = |cells: usize, count: usize| -> Vec<SurvivalCurve> {
         (0..cells).map(|i| survival(count, 0.3 + 0.1 * i as f64, 1.4)).collect()
     };
-    add("survival-1", survive(cells(1, 256), None));
-    add("survival-3", survive(cells(3, 512), None));
-    add("survival-8", survive(cells(8, 512), None));
-    add("survival-20", survive(cells(20, 200), None));
-    add("survival-1000", survive(cells(40, 2000).into_iter().cycle().take(1000).collect(), None));
-    add("survival-million", survive(cells(4, 250_000), None));
-    add("survival-log", survive(cells(3, 200), Some(Scale::Log)));
-    add("survival-none", survive(vec![], None));
-    add("survival-empty", survive(vec![SurvivalCurve::default(); 12], None));
+    add("survival-1", survive(cells(1, 256)));
+    add("survival-3", survive(cells(3, 512)));
+    add("survival-8", survive(cells(8, 512)));
+    add("survival-20", survive(cells(20, 200)));
+    add("survival-1000", survive(cells(40, 2000).into_iter().cycle().take(1000).collect()));
+    add("survival-million", survive(cells(4, 250_000)));
+    add("survival-wide", survive((0..3).map(|i| survival(200, 0.01 * 20_f64.powi(i), 100.0)).collect()));
+    add("survival-none", survive(vec![]));
+    add("survival-empty", survive(vec![SurvivalCurve::default(); 12]));
     let alone = SurvivalCurve { t: vec![0.4], survival: vec![0.0], ..SurvivalCurve::default() };
-    add("survival-one", survive(vec![alone.clone()], None));
-    add("survival-censored", survive(vec![SurvivalCurve { t: vec![], censored: vec![2.0; 9], ..alone.clone() }], None));
+    add("survival-one", survive(vec![alone.clone()]));
+    add("survival-censored", survive(vec![SurvivalCurve { t: vec![], censored: vec![2.0; 9], ..alone.clone() }]));
     let (t, survival) = (unknown.to_vec(), unknown.to_vec());
-    add("survival-unknown", survive(vec![SurvivalCurve { t, survival, ..alone }], Some(Scale::Log)));
+    add("survival-unknown", survive(vec![SurvivalCurve { t, survival, ..alone }]));
 
     let theory =
         Theory { label: "exp(−24 t/R⁴), R = 1.41".into(), law: DecayLaw::Exponential { start: 0.06, rate: 6.0 } };
     let algebraic = DecayLaw::Algebraic { start: 0.09, time: 0.5, power: 4.0 };
     let algebraic = Theory { label: "(1 + 2t/R₀⁴)⁻⁴".into(), law: algebraic };
-    let fall = |curves: Vec<DecayCurve>, time: Option<Scale>| {
-        let theory = if time == Some(Scale::Log) { &algebraic } else { &theory };
+    let fall_by = |theory: &Theory, curves: Vec<DecayCurve>| {
         let (text, theory) = (text("Mean excess in time", "", growing(curves.len())), vec![theory.clone()]);
-        Decay { text, band: "5 to 95 % of the members", curves, theory, time }.draw(medium)
+        Decay { text, band: "5 to 95 % of the members", curves, theory }.draw(medium)
     };
+    let fall = |curves: Vec<DecayCurve>| fall_by(&theory, curves);
     let falls =
         |cells: usize, count: usize| -> Vec<DecayCurve> { (0..cells).map(|i| decay(6.0 + i as f64, count)).collect() };
-    add("decay-1", fall(falls(1, 60), None));
-    add("decay-3", fall(falls(3, 200), None));
-    add("decay-30", fall(falls(30, 5000), None));
-    add("decay-long", fall(vec![decay(60.0, 500)], None));
-    add("decay-log", fall(falls(2, 400), Some(Scale::Log)));
-    add("decay-million", fall(falls(4, 250_000), None));
-    add("decay-none", fall(vec![], None));
-    add("decay-one", fall(vec![DecayCurve { t: vec![0.0], mean: vec![0.1], ..DecayCurve::default() }], None));
+    add("decay-1", fall(falls(1, 60)));
+    add("decay-3", fall(falls(3, 200)));
+    add("decay-30", fall(falls(30, 5000)));
+    add("decay-long", fall(vec![decay(60.0, 500)]));
+    add("decay-algebraic", fall_by(&algebraic, falls(2, 400)));
+    add("decay-million", fall(falls(4, 250_000)));
+    add("decay-none", fall(vec![]));
+    add("decay-one", fall(vec![DecayCurve { t: vec![0.0], mean: vec![0.1], ..DecayCurve::default() }]));
     let zero = DecayCurve { t: vec![0.0, 1.0], mean: vec![0.0; 2], ..DecayCurve::default() };
-    add("decay-zero", fall(vec![zero.clone()], None));
-    add("decay-equal", fall(vec![DecayCurve { mean: vec![0.1; 2], ..zero }], None));
+    add("decay-zero", fall(vec![zero.clone()]));
+    add("decay-equal", fall(vec![DecayCurve { mean: vec![0.1; 2], ..zero }]));
     let unknowns = unknown.to_vec();
     let band = Some((unknowns.clone(), unknowns.clone()));
-    add("decay-unknown", fall(vec![DecayCurve { t: unknowns.clone(), mean: unknowns, band }], None));
+    add("decay-unknown", fall(vec![DecayCurve { t: unknowns.clone(), mean: unknowns, band }]));
 
     let depend_on = |labels: Vec<String>, values: Option<Vec<f64>>, series: Vec<Series>, key: &str| {
         let other = CellKey { labels, values, ..CellKey::from("aspect") };
         let text = text("Relaxation time against amplitude", "t_relax", other);
-        Dependence { text, key, series, across: None, time: None }.draw(medium)
+        Dependence { text, key, series }.draw(medium)
     };
     let depend = |series: Vec<Series>, key: &str| depend_on(vec!["all".into()], None, series, key);
     add("dependence", depend(vec![amplitudes(0.12, 8)], "amplitude"));
@@ -212,7 +212,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     partial.levels[0].quartiles.1 = None;
     partial.levels[1].quartiles.1 = None;
     let unsaid = ChartText { note: String::new(), ..text("Linear axes", "t_relax", CellKey::default()) };
-    let linear = Dependence { text: unsaid, key: "amplitude", series: vec![partial], ..Dependence::default() };
+    let linear = Dependence { text: unsaid, key: "amplitude", series: vec![partial] };
     add("dependence-partial", linear.draw(medium));
     for count in [3, 8, 12] {
         let labels = (1..=count).map(|aspect| format!("aspect = {aspect}")).collect();
@@ -373,6 +373,6 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     let key = CellKey { labels: vec![hostile.into(); 2], ..hostile.into() };
     let text = ChartText { note: hostile.into(), ..self::text(hostile, hostile, key) };
     let curves = vec![cells(1, 20).remove(0); 2];
-    add("hostile", Survival { text, share: hostile, none: hostile, curves, time: None }.draw(medium));
+    add("hostile", Survival { text, share: hostile, none: hostile, curves }.draw(medium));
     pictures
 }

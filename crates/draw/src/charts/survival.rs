@@ -31,15 +31,13 @@ pub struct Survival<'a> {
     pub none: &'a str,
     /// The curves, in the order of the legend.
     pub curves: Vec<SurvivalCurve>,
-    /// Scale of time; linear by default, unless [`Scale::of`] says otherwise for the quartiles of the curves.
-    pub time: Option<Scale>,
 }
 
 /// Curves of relaxation times.
 impl Default for Survival<'_> {
     fn default() -> Self {
         let (share, none) = ("share not relaxed", "There are no members, so there is nothing to survive.");
-        Survival { text: ChartText::default(), share, none, curves: Vec::new(), time: None }
+        Survival { text: ChartText::default(), share, none, curves: Vec::new() }
     }
 }
 
@@ -143,7 +141,7 @@ impl Survival<'_> {
         let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
 
         let times = || curves.iter().flat_map(SurvivalCurve::times);
-        let scale = self.time.unwrap_or_else(|| Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles)));
+        let scale = Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over(&text.quantity, TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));

@@ -63,8 +63,8 @@ pub fn resume_like(begun: Begun, study: &Study, asked: BackendChoice, host: &dyn
 /// Carries out `session`. If a GPU fails that `--backend auto` chose, the run continues on the CPU from its last
 /// checkpoint, as by `resume --backend cpu`.
 fn complete(session: Session, host: &dyn Host) -> Result<Completed> {
-    let falls_back = session.may_fall_back();
-    let (path, stop) = (session.folder().to_path_buf(), session.stop().clone());
+    let Session { placed, report, .. } = &session;
+    let (falls_back, path, stop) = (placed.may_fall_back(), report.folder().to_path_buf(), report.stop().clone());
     match session.carry_out(host) {
         Err(Error::Device(fault)) if falls_back => {
             let why = format!("the GPU failed: {fault}");

@@ -6,7 +6,7 @@ use super::{
     host::Host,
     placed::{FirstBackend, PlacedStudy, open},
 };
-use crate::report::{ReportOptions, RunReport, Stop};
+use crate::report::{ReportOptions, RunReport};
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
@@ -33,9 +33,9 @@ pub struct Completed {
 
 /// A study that is being carried out.
 pub struct Session {
-    placed: PlacedStudy,
+    pub(super) placed: PlacedStudy,
     first: FirstBackend,
-    report: RunReport,
+    pub(super) report: RunReport,
     /// The progress in the report's current stage.
     progress: RunProgress,
 }
@@ -68,21 +68,6 @@ impl Session {
         Ok(Session { placed, first: FirstBackend::Unopened, report, progress })
     }
 
-    /// Returns whether the CPU may take over if the GPU fails.
-    pub fn may_fall_back(&self) -> bool {
-        self.placed.may_fall_back()
-    }
-
-    /// The output folder.
-    pub fn folder(&self) -> &Path {
-        self.report.folder()
-    }
-
-    /// The means to stop the session.
-    pub fn stop(&self) -> &Stop {
-        self.report.stop()
-    }
-
     /// Runs the remaining work, and publishes all results. If a GPU fails from which the CPU may take over, the run is
     /// always saved.
     ///
@@ -92,7 +77,7 @@ impl Session {
         self.check_rows()?;
         let early = [&self.placed.warnings()[..], self.report.moves()].concat();
         early.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
-        let (out, falls_back) = (self.folder().to_path_buf(), self.may_fall_back());
+        let (out, falls_back) = (self.report.folder().to_path_buf(), self.placed.may_fall_back());
         let Session { placed: PlacedStudy { study, choices, .. }, first, mut report, progress } = self;
         if let Err(error) = advance(&study, choices, first, progress, &mut report, host) {
             return Err(ended(report, error, falls_back, &out, host));
@@ -110,7 +95,7 @@ impl Session {
         if told == rows {
             return Ok(());
         }
-        let path = self.folder().display();
+        let path = self.report.folder().display();
         Err(Error::Request(format!("{path}: the checkpoint counts {told} members, but the table has {rows}")))
     }
 }

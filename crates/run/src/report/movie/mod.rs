@@ -11,8 +11,6 @@ pub mod moved;
 pub mod pace;
 pub mod svg;
 
-use std::fmt::Write;
-
 use glam::DVec2;
 
 use super::{
@@ -183,17 +181,15 @@ impl Movie {
     /// The clock at the time `t`, with equally many digits throughout.
     fn clock(&self, t: f64) -> String {
         let power = power_of(self.pace.end());
-        let mut clock = String::from("t = ");
-        // Writing into a string cannot fail.
-        let _ = match power {
+        let shown = match power {
             -3..6 => {
                 let digits = (3 - power).max(1 - power_of(self.pace.time(EARLY)));
-                write!(clock, "{t:.*}", digits.clamp(0, MAX_DIGITS) as usize)
+                format!("{t:.*}", digits.clamp(0, MAX_DIGITS) as usize)
             }
-            _ if t == 0.0 => write!(clock, "0"),
-            _ => write!(clock, "{t:.3e}"),
+            _ if t == 0.0 => "0".into(),
+            _ => format!("{t:.3e}"),
         };
-        clock + &self.unit
+        format!("t = {shown}{}", self.unit)
     }
 
     /// What the head says at its right: of the clock, if there is room, and of the grey line.

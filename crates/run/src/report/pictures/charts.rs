@@ -175,7 +175,7 @@ impl FinishedRun<'_> {
             0 => "There are no members, so there are no events.",
             _ => "No event has statistics, as members were stopped before it when they relaxed.",
         };
-        let survival = Survival { text, share: "share without the event", none, curves, time: None };
+        let survival = Survival { text, share: "share without the event", none, curves };
         let caption = format!(
             "Share of the members in which an event has not happened yet. {}",
             survival_caption(&survival, "that")
@@ -216,7 +216,7 @@ impl FinishedRun<'_> {
             false => ("Mean excess", "over all members, while all of them run"),
         };
         let (text, band) = (self.text(medium, title, over, key), "5 to 95 % of the members");
-        let decay = Decay { text, band, curves, theory, time: None };
+        let decay = Decay { text, band, curves, theory };
         let excess = match self.spec().sweep.has("energy") {
             true => Equilibrium::Wulff(Energy::default()),
             false => self.spec().typical().flow.equilibrium(),
@@ -303,7 +303,7 @@ impl FinishedRun<'_> {
         let left_out = self.statistics.scaling.as_ref().map(Scaling::in_words).filter(|told| !told.is_empty());
         let left_out = left_out.map_or(String::new(), |told| format!("not in the fit: {told}"));
         let text = self.text(medium, &title, &joined([self.error(), left_out]), &others);
-        let chart_of = Dependence { text, key: &axis.key, series, across: None, time: None };
+        let chart_of = Dependence { text, key: &axis.key, series };
         let quantity = self.statistics.time();
         let each = self.spec().members_per_cell() == 1;
         let caption = match each {
