@@ -30,4 +30,4 @@ class Interrupted(KeyboardInterrupt):
 
 
 class CurvelaxWarning(UserWarning):
-    """What one should know about results."""
+    """Warnings about results."""

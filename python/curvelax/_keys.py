@@ -12,8 +12,8 @@ class Keys(TypedDict, total=False):
     """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
 
     curves: int
-    """Number of members. Of outlines, the number of copies of each, perturbed by amplitude; of files:PATTERN without
-    the flag, each runs once, unperturbed. By default 256."""
+    """Number of members. For outlines, the number of copies of each, perturbed by amplitude; without the flag,
+    several outlines, or files:PATTERN, run once each, unperturbed. By default 256."""
 
     outlines: int
     """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
@@ -88,7 +88,7 @@ class Keys(TypedDict, total=False):
     energy: str
     """Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is
     1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may
-    be a distribution. 1 is the constant, in the geometric form as all others. By default 1."""
+    be a distribution. energy 1 is isotropic, but in the geometric form. By default 1."""
 
     diffusivity: str
     """Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
@@ -158,10 +158,10 @@ class Keys(TypedDict, total=False):
     false."""
 
     accuracy: float
-    """Choose n, the tolerance and the number of members so that the 95 % interval of the median t_limit, for sampling
-    and discretisation together, is within X times the median. For outlines, whose number is given: n and the
-    tolerance so that each t_error is within X times t_limit. It starts from curves, points and adaptive. If X cannot
-    be reached, the run keeps its best result and exits with code 3. Needs refine. By default off."""
+    """With refine or accurate: choose n, the tolerance and the number of members so that the 95 % interval of the
+    median t_limit, for sampling and discretisation together, is within X times the median. For outlines, whose number
+    is given: n and the tolerance so that each t_error is within X times t_limit. It starts from curves, points and
+    adaptive. If X cannot be reached, the run keeps its best result and exits with code 3. By default off."""
 
     pull: float | Literal["auto"]
     """Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of

@@ -55,7 +55,7 @@ class Picture:
     ) -> Path:
         """Writes the picture for a paper as ``out``, whose name ends in .png or .pdf; returns its path.
 
-        It is white, with text of 7 points, and without title and sentences, which belong into the caption. ``width`` is
+        It is white, with text of 7 points, and without title and sentences, which belong in the caption. ``width`` is
         ``"column"`` (85 mm), ``"page"`` (170 mm) or 80 to 300 mm. ``dpi``, 72 to 1200, is for .png; its default is 600. An
         existing file is replaced.
 
@@ -132,7 +132,7 @@ class Study:
 
     @property
     def warnings(self) -> list[str]:
-        """What one should know about the results, one sentence each."""
+        """Warnings about the results, one sentence each."""
         return [in_python(warning) for warning in self.record["warnings"]]
 
     @property
@@ -143,7 +143,7 @@ class Study:
     def table(self, name: str, *, frames: Literal["pandas", "polars"] = "pandas") -> Any:
         """The table ``name``, such as ``"rates"``, as a data frame of pandas or polars.
 
-        Floats have every bit. An unknown number is missing; columns have their types also if all of it is.
+        Floats have every bit. An unknown number is missing; columns keep their types even if all of it is.
 
         Raises
         ------
@@ -165,7 +165,7 @@ class Study:
         Raises
         ------
         RequestError
-            If neither of both libraries is installed.
+            If neither library is installed.
         """
         has = {name: importlib.util.find_spec(name) is not None for name in ("pyarrow", "polars")}
         if not any(has.values()):

@@ -67,7 +67,7 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
     format!("{ended} of {members} started members ended in {}{failed}", duration(*seconds))
 }
 
-/// The members that run besides, for the error of discretisation.
+/// The further runs of members, for the error of discretisation.
 fn levels(
     Estimate { level_members, finer_members, varied_members, most_points, .. }: &Estimate,
     is_open: bool,
@@ -84,11 +84,11 @@ fn levels(
     };
     let varied = match varied_members {
         0 => String::new(),
-        members => format!("; {members} on other curves through their outlines"),
+        members => format!("; {members} more on other curves through the points of the outlines"),
     };
     match *level_members {
         0 => "none: the error of discretisation will not be known".into(),
-        members => format!("{members} {} besides at other resolutions{finer}{varied}", plural(members, "member")),
+        members => format!("{members} more {} at other resolutions{finer}{varied}", plural(members, "run")),
     }
 }
 
@@ -128,7 +128,7 @@ mod tests {
         };
         let expected = "\
 members    3000 in 1 cell
-levels     32 members besides at other resolutions
+levels     32 more runs at other resolutions
 back end   cpu, f64, 2 threads (asked for); solver gauss-seidel
 resident   128 members at once
 memory     about 17 MB
@@ -141,10 +141,13 @@ pilot      130 of 130 started members ended in 1.40 s
 ";
         assert_eq!(table(&estimate, &Spec::default()), expected);
         let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
-        let told = "levels     32 members besides at other resolutions; about 12 need more nodes, up to n = 1600\n";
+        let told = "levels     32 more runs at other resolutions; about 12 need more nodes, up to n = 1600\n";
         assert!(table(&finer, &Spec::default()).contains(told));
         let varied = Estimate { varied_members: 8, ..finer };
-        assert!(table(&varied, &Spec::default()).contains("n = 1600; 8 on other curves through their outlines\n"));
+        assert!(
+            table(&varied, &Spec::default())
+                .contains("n = 1600; 8 more on other curves through the points of the outlines\n")
+        );
         // Pilots that end before their members do not tell which need more nodes.
         let untold = Estimate { finer_members: None, most_points: 1600, ..estimate.clone() };
         let untold = table(&untold, &Spec { refine: true, ..Spec::default() });

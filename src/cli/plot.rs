@@ -34,7 +34,7 @@ plots/portraits.json in DIR, or with --format plots/*.png and plots/*.pdf. The s
 same bytes as the run.
 
 Pictures as png and pdf are for papers: white, as wide as a column, with text of 7 points and without title and
-sentences, which belong into the caption. The text of a pdf can be selected. Journals ask for columns of 84 to 90 mm and
+sentences, which belong in the caption. The text of a pdf can be selected. Journals ask for columns of 84 to 90 mm and
 for pages of 170 to 190 mm.";
 
 /// Redraw the plots and the report of a finished run.

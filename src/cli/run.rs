@@ -17,7 +17,7 @@ Examples:
   curvelax run --flow willmore --curves 10000 --stop-when-relaxed --out willmore
   curvelax run --accurate --out accurate
       the same ellipses, each time with its limit for n → ∞ and its error
-  curvelax run --accurate --relax-at 0.01 --shape file:island.csv --out island
+  curvelax run --accurate --relax-at 0.01 --shape file:island.csv --curves 1 --amplitude 0 --out island
   curvelax run --accurate --accuracy 1e-3 --out thousandth
       as many members as the median needs
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml

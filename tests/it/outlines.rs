@@ -383,10 +383,10 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
     };
     let told = line("");
     assert!(
-        told.starts_with("1 as a spline, 1 as a polygon; corners of 1 were rounded, which changed the area by"),
+        told.starts_with("1 interpolated by a spline, 1 interpolated as a polygon; corners of 1 were rounded, which changed the area by"),
         "{told}"
     );
-    assert_eq!(line("--interpolate polygon --rounding 0"), "2 as a polygon");
+    assert_eq!(line("--interpolate polygon --rounding 0"), "2 interpolated as a polygon");
     // The ellipse by half the points, and the star with twice the radius: levels 103 and 203 and their like.
     let varied = |flags: &str| {
         let estimate = done(home, &format!("{run} {flags} --dry-run --json"));

@@ -294,7 +294,7 @@ fn driven_members_have_relaxed_and_vanished_each_at_its_own_time() {
 #[test]
 fn a_page_says_once_what_ran_and_a_file_says_it_too() {
     let done = run(RUN);
-    let what = "surface-diffusion, n = 40, adaptive 0.001";
+    let what = "surface-diffusion, amplitude 0.05, n = 40, adaptive 0.001";
     assert_eq!(done.text("report.html").matches(what).count(), 1);
     for name in plots(&done).into_iter().filter(|name| name.ends_with("svg") && name != "curves.svg") {
         assert_eq!(done.text(&format!("plots/{name}")).matches(what).count(), 1, "{name}");

@@ -104,7 +104,7 @@ fn cells_with_common_random_numbers_are_paired_alike_in_one_run_in_shards_and_wh
         assert_eq!(differences(&home.path().join("one"), &home.path().join(&out)), [""; 0], "{count} shards");
     }
     let page = fs::read(home.path().join("one/report.html")).unwrap();
-    assert!(String::from_utf8_lossy(&page).contains("t_relax less that of the same member of cell 0"));
+    assert!(String::from_utf8_lossy(&page).contains("t_relax minus that of the same member of cell 0"));
     done(home.path(), "plot one --out again");
     assert!(fs::read(home.path().join("again/report.html")).unwrap() == page, "redrawn pairs differ");
 }

@@ -96,7 +96,7 @@ impl Run {
         let study: &'static Study = Box::leak(Box::new(settings.study()?));
         let [cell] = study.cells() else { return Err("this page runs one ensemble at a time".into()) };
         let (spec, members) = (&cell.spec, study.member_count() as usize);
-        let blocks = Blocks::new(spec.points).ok_or("a ring of fewer than 6 nodes cannot be coloured")?;
+        let blocks = Blocks::new(spec.points).ok_or("the scheme needs 6 nodes")?;
         let method = Method {
             solver: spec.solver(),
             order: spec.order,

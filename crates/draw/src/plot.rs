@@ -99,7 +99,7 @@ impl Plot {
     pub fn draw(&self, medium: Medium) -> String {
         let (most, least, head) = match medium {
             Medium::Screen | Medium::Page => (MAX_WIDTH, MIN_WIDTH, HEAD),
-            // Title and sentence belong into the caption.
+            // Title and sentence belong in the caption.
             Medium::Paper(width) => (width - LEFT - RIGHT, width, RIGHT),
         };
         let frame = Frame::new(&self.panels, most);

@@ -1,7 +1,7 @@
 //! The columns of the tables of a run, for documents and for programs that read them.
 
 use crate::{
-    TableRow, members, names,
+    TableRow, names,
     tables::{EventLevelRow, EventRow, NodeRow, RateRow},
 };
 use curvelax_base::error::Result;
@@ -14,6 +14,13 @@ use curvelax_study::results::{
 
 /// Heading of a column, what its fields hold, and what they mean.
 pub type ColumnText = [String; 3];
+
+/// The first columns of `members.csv`, with their meanings.
+const OF_MEMBERS: [(&str, &str, &str); 3] = [
+    ("member", "integer", "index of the member, from 0"),
+    ("cell", "integer", "index of its cell, from 0"),
+    ("label", "word", "name of its outline; empty if it has none"),
+];
 
 /// The columns of the table `name` of a run of `spec` with these statistics; none if it is no such table.
 ///
@@ -41,7 +48,7 @@ pub(super) fn of_growing(name: &str, spec: &Spec) -> Result<Vec<ColumnText>> {
     Ok(match name {
         names::SUMMARY => of::<Outcome>(),
         names::MEMBERS => {
-            let indices = members::OWN.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
+            let indices = OF_MEMBERS.map(|(name, holds, meaning)| [name, holds, meaning].map(str::to_owned));
             let of_feature = |Feature { name, meaning, is_flag }: Feature| {
                 [name, if is_flag { "integer" } else { "float" }.to_owned(), meaning]
             };

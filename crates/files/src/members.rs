@@ -12,13 +12,6 @@ use super::{
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Feature, Features, Outcome, Spec};
 
-/// The first columns, with their meanings.
-pub const OWN: [(&str, &str, &str); 3] = [
-    ("member", "integer", "index of the member, from 0"),
-    ("cell", "integer", "index of its cell, from 0"),
-    ("label", "word", "name of its outline; empty if it has none"),
-];
-
 /// The fields of its rows.
 pub struct MemberFields {
     spec: Spec,

@@ -265,8 +265,7 @@ fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
 }
 
 fn ring(n: usize) -> Result<Blocks> {
-    Blocks::new(n)
-        .ok_or_else(|| Error::value("points", n, "a ring of fewer than 6 nodes cannot be coloured", "use 6 or more"))
+    Blocks::new(n).ok_or_else(|| Error::value("points", n, "the scheme needs 6 nodes", "use 6 or more"))
 }
 
 impl ChosenBackend {

@@ -158,8 +158,8 @@ keys! {
     #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
     #[allow(rustdoc::broken_intra_doc_links)] // the brackets of a grammar
     pub struct Spec {
-        /// Number of members. Of outlines, the number of copies of each, perturbed by --amplitude; of files:PATTERN
-        /// without the flag, each runs once, unperturbed [default: 256]
+        /// Number of members. For outlines, the number of copies of each, perturbed by --amplitude; without the flag,
+        /// several outlines, or files:PATTERN, run once each, unperturbed [default: 256]
         curves: u64 = 256, "COUNT", Ensemble;
         /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -212,7 +212,7 @@ keys! {
         flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", Evolution;
         /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG]
         /// is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any
-        /// number may be a distribution. 1 is the constant, in the geometric form as all others [default: 1]
+        /// number may be a distribution. --energy 1 is isotropic, but in the geometric form [default: 1]
         #[serde(skip_serializing_if = "Option::is_none")]
         energy: Option<Drawn<Energy>> = None, "GAMMA", Evolution;
         /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
@@ -308,11 +308,11 @@ keys! {
         /// [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         refine: bool = false, "BOOL", Evolution;
-        /// Choose n, the tolerance and the number of members so that the 95 % interval of the median t_limit, for
-        /// sampling and discretisation together, is within X times the median. For outlines, whose number is given: n
-        /// and the tolerance so that each t_error is within X times t_limit. It starts from --curves, --points and
-        /// --adaptive. If X cannot be reached, the run keeps its best result and exits with code 3. Needs --refine
-        /// [default: off]
+        /// With --refine or --accurate: choose n, the tolerance and the number of members so that the 95 % interval of
+        /// the median t_limit, for sampling and discretisation together, is within X times the median. For outlines,
+        /// whose number is given: n and the tolerance so that each t_error is within X times t_limit. It starts from
+        /// --curves, --points and --adaptive. If X cannot be reached, the run keeps its best result and exits with code
+        /// 3 [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
         accuracy: Option<f64> = None, "X", Evolution;
         /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL.

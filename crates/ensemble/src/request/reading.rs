@@ -64,14 +64,19 @@ struct Given {
 
 /// Lines longer than this are not shown with a caret.
 const MAX_LINE: usize = 300;
-/// Maximum characters of a message; the list of all keys is half as long.
+/// Maximum characters of a message.
 const MAX_SHOWN: usize = 1000;
 
 /// What is wrong, with the line and a caret; for an overlong line, only where.
 fn in_words(error: &toml::de::Error) -> String {
     let whole = error.to_string();
     let (whole, message) = (whole.trim_end(), error.message().trim_end());
-    let problem = shortened(&plainly(message), MAX_SHOWN);
+    // The list of all keys is longer than what is wrong.
+    let problem = match message.split_once(", expected one of ") {
+        Some((problem, _)) if message.starts_with("unknown field") => problem,
+        _ => message,
+    };
+    let problem = shortened(&plainly(problem), MAX_SHOWN);
     match whole.strip_suffix(message) {
         Some(shown) if shown.lines().all(|line| line.len() <= MAX_LINE) => format!("{shown}{problem}"),
         _ => format!("{}: {problem}", shortened(whole.lines().next().unwrap_or_default(), MAX_LINE)),
@@ -82,6 +87,13 @@ fn in_words(error: &toml::de::Error) -> String {
 fn suggestion(message: &str) -> String {
     let mut names = quoted(message);
     match names.next() {
+        Some("accurate") if message.starts_with("unknown field") => {
+            "; --accurate is a flag: `curvelax run --accurate --print-spec` prints the keys that it stands for".into()
+        }
+        Some(word) if message.starts_with("unknown field") => match did_you_mean(word, names) {
+            none if none.is_empty() => "; `curvelax run --print-spec` prints all keys".into(),
+            near => near,
+        },
         Some(word) if message.starts_with("unknown ") => did_you_mean(word, names),
         _ => String::new(),
     }
@@ -125,6 +137,13 @@ mod tests {
         let message = Spec::from_toml("curves = 3\nomga = 1\n").unwrap_err();
         for part in ["line 2, column 1", "2 | omga = 1", "^^^^", "unknown key `omga`", "did you mean `omega`?"] {
             assert!(message.contains(part), "no {part:?} in: {message}");
+        }
+        assert!(!message.contains("`curves`"), "all keys are listed: {message}");
+        for (text, remedy) in
+            [("qqq = 1", "--print-spec` prints all keys"), ("accurate = true", "the keys that it stands")]
+        {
+            let message = Spec::from_toml(text).unwrap_err();
+            assert!(message.contains(remedy) && !message.contains("did you mean"), "{message}");
         }
         let message = Spec::from_toml("order = 'colored'").unwrap_err();
         assert!(message.contains("unknown value `colored`"), "{message}");

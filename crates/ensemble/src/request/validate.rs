@@ -104,11 +104,7 @@ impl Spec {
             return Err(Error::value("curves", self.curves, problem, &format!("use 1 to {MAX_CURVES}")));
         }
         if !(MIN_POINTS..=MAX_POINTS).contains(&self.points) {
-            let problem = if self.points < MIN_POINTS {
-                "a ring of fewer than 6 nodes cannot be coloured"
-            } else {
-                "too many nodes"
-            };
+            let problem = if self.points < MIN_POINTS { "the scheme needs 6 nodes" } else { "too many nodes" };
             let allowed = format!("use {MIN_POINTS} to {MAX_POINTS}");
             return Err(Error::value("points", self.points, problem, &allowed));
         }

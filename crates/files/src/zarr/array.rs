@@ -1,11 +1,9 @@
 //! An array of a growing store, chunk by chunk.
 
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{
-    chunks::{DataType, chunk_shape, key},
-    mark::ArrayMark,
-};
+use super::chunks::{DataType, chunk_shape, key};
 use crate::part_folder::PartFolder;
 use curvelax_base::error::Result;
 
@@ -22,6 +20,20 @@ pub(super) struct Array {
     pub(super) bytes: u64,
     /// Bytes between two elements that always begin a chunk.
     pub(super) run_bytes: u64,
+}
+
+/// The extent of an array, as recorded in a checkpoint.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct ArrayMark {
+    pub(super) name: String,
+    /// Chunks in each dimension.
+    pub(super) grid: Vec<u64>,
+    /// Number of chunks written, and the CRC-32C of all of them.
+    pub(super) written: u64,
+    pub(super) crc: u32,
+    /// The chunk that is being filled.
+    pub(super) chunk: Vec<u8>,
+    pub(super) run_left: u64,
 }
 
 impl Array {
@@ -63,6 +75,15 @@ impl Array {
             fill,
             run_bytes,
         }
+    }
+
+    /// Continues from the mark, if it belongs to this array.
+    pub(super) fn resume_from(&mut self, mark: &ArrayMark) -> bool {
+        let ArrayMark { name, grid, written, chunk, run_left, .. } = mark;
+        let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
+        let fits = fits && name == self.name && *grid == self.mark.grid && *run_left <= self.run_bytes;
+        self.mark.clone_from(mark);
+        fits
     }
 
     /// Adds elements, and writes the chunks that they complete.

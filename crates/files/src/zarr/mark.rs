@@ -5,7 +5,7 @@ use std::{fs, io::Read};
 use serde::{Deserialize, Serialize};
 
 use super::{
-    array::Array,
+    array::ArrayMark,
     chunks::{CHUNK_BYTES, key},
     layout::{FIELDS, STATUS},
 };
@@ -17,31 +17,6 @@ use curvelax_base::{error::Result, input};
 pub struct StoreMark {
     /// Its growing arrays.
     pub(super) arrays: Vec<ArrayMark>,
-}
-
-/// The extent of an array.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct ArrayMark {
-    pub(super) name: String,
-    /// Chunks in each dimension.
-    pub(super) grid: Vec<u64>,
-    /// Number of chunks written, and the CRC-32C of all of them.
-    pub(super) written: u64,
-    pub(super) crc: u32,
-    /// The chunk that is being filled.
-    pub(super) chunk: Vec<u8>,
-    pub(super) run_left: u64,
-}
-
-impl Array {
-    /// Continues from the mark, if it belongs to this array.
-    pub(super) fn resume_from(&mut self, mark: &ArrayMark) -> bool {
-        let ArrayMark { name, grid, written, chunk, run_left, .. } = mark;
-        let fits = chunk.len() < self.chunk_bytes && *written <= grid.iter().product();
-        let fits = fits && name == self.name && *grid == self.mark.grid && *run_left <= self.run_bytes;
-        self.mark.clone_from(mark);
-        fits
-    }
 }
 
 impl StoreMark {

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::{
-    array::Array,
+    array::{Array, ArrayMark},
     chunks::{CHUNK_BYTES, key},
     layout::{Arrays, arrays, times},
-    mark::{ArrayMark, StoreMark},
+    mark::StoreMark,
 };
 use curvelax_base::{
     error::{Error, Result},

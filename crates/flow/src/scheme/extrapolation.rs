@@ -4,8 +4,8 @@
 //! Row j is the result of [`divisions`] n_j steps of the paper of length h/n_j, its parts. The scheme is of first
 //! order, and its error has an expansion in powers of the length of the parts, so the Aitken–Neville combination of the
 //! first J rows is of order J (E. Hairer and G. Wanner, *Solving Ordinary Differential Equations II*, section IV.9),
-//! with the weights `w_j = Π_{i≠j} n_j/(n_j - n_i)`. The rows from 2 to J give order J-1, and the difference between the
-//! two measures the error. All of x, y, k and r are combined, each by itself.
+//! with the weights `w_j = Π_{i≠j} n_j/(n_j - n_i)`. The rows from 2 to J give order J-1, and the difference between
+//! the two measures the error. All of x, y, k and r are combined, each by itself.
 //!
 //! Backward differences at the ends of the rows are combined in the same way: the first and second derivatives at the
 //! end of the step, from which [`dense`](super::dense) takes what lies inside steps (E. Hairer and A. Ostermann, *Dense

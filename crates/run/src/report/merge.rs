@@ -241,7 +241,7 @@ impl Shards {
         }
         let there = self.parts.len();
         Err(Error::Request(format!(
-            "{there} of {} shards are done; {}; `curvelax merge --missing` prints what submits them",
+            "{there} of {} shards are done; {}; `curvelax merge --missing` prints the command that submits them",
             there as u64 + total(&missing),
             listed(&self.in_words(), NAMED, "; ")
         )))

@@ -222,9 +222,13 @@ impl Overview<'_> {
         for (i, difference) in comparison.paired_cells().unwrap_or_default().iter().take(MAX_CELLS).enumerate() {
             if i == 0 {
                 let time = self.statistics.time();
-                writeln!(f, "{:<11}{time} less that of the same member of cell 0 (Wilcoxon's signed ranks):", "pairs")?;
+                writeln!(
+                    f,
+                    "{:<11}{time} minus that of the same member of cell 0 (Wilcoxon signed-rank test):",
+                    "pairs"
+                )?;
             }
-            writeln!(f, "{:<11}{}", difference.cell, paired(difference))?;
+            writeln!(f, "{:<11}{}", format!("cell {}", difference.cell), paired(difference))?;
         }
         Ok(())
     }
@@ -259,14 +263,12 @@ impl Overview<'_> {
             several => format!("{several} steps"),
         };
         let solves_each = if solves == steps { String::new() } else { format!(" ({} solves)", each(*solves)) };
-        match sweeps_k + sweeps_x {
-            0 => format!("{steps_each} per member{solves_each}, no sweeps"),
-            _ => format!(
-                "{steps_each} per member{solves_each}, Gauss-Seidel sweeps {} for k and {} for x, y",
-                each(*sweeps_k),
-                each(*sweeps_x)
-            ),
-        }
+        let sweeps = match sweeps_k + sweeps_x {
+            0 => "no sweeps".into(),
+            _ => format!("Gauss-Seidel sweeps {} for k and {} for x, y", each(*sweeps_k), each(*sweeps_x)),
+        };
+        let without = if self.spec.refine { "; without the runs at other resolutions" } else { "" };
+        format!("{steps_each} per member{solves_each}, {sweeps}{without}")
     }
 }
 
@@ -282,7 +284,7 @@ fn more(f: &mut fmt::Formatter, all: usize, one: &str, table: &str) -> fmt::Resu
 /// Whether all of `what` could have one distribution, or why that is not known.
 fn compared(f: &mut fmt::Formatter, of: &CellComparison, what: &str, of_cell: &str) -> fmt::Result {
     if let Some(test) = of.log_rank() {
-        writeln!(f, "{what:<11}log-rank test that all {what} have one distribution{of_cell}: {}", chi(test))?;
+        writeln!(f, "{what:<11}log-rank test that all {what} have the same distribution{of_cell}: {}", chi(test))?;
     }
     of.refusal().map_or(Ok(()), |why| writeln!(f, "{what:<11}not compared{of_cell}: {why}"))
 }
@@ -318,9 +320,9 @@ unfinished          1    25.0 %
 stalled             1    25.0 %
 all                 4
 
-ensemble   ellipse:2,1, surface-diffusion, n = 100, tau = 0.001, t-end = 2, seed 1
+ensemble   ellipse:2,1, surface-diffusion, amplitude 0.05, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    median 0.5000 (range of 4, 0.3000 or more, covers 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that relaxed; 2 censored
-error      discretisation not known: no member has times at n, n/√2 and n/2 nodes
+error      sampling not known: too few members relaxed; discretisation not known: no member has times at n, n/√2 and n/2 nodes
 work       10 steps per member, Gauss-Seidel sweeps 20 for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

@@ -55,7 +55,7 @@ pub fn describe(spec: &Spec) -> String {
         ("drive", spec.drive.as_ref().map_or(String::new(), |drive| format!("drive {drive}"))),
         ("conserve", spec.conserve.map_or(String::new(), |what| format!("{what} kept"))),
         ("reduced-area", spec.reduced_area.as_ref().map_or(String::new(), |of| format!("reduced area {of}"))),
-        ("amplitude", drawn("amplitude", &spec.amplitude)),
+        ("amplitude", format!("amplitude {}", spec.amplitude)),
         ("decay", drawn("decay", &spec.decay)),
         ("perturbation", perturbation.into()),
         ("design", design),
@@ -251,8 +251,13 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
     // Members that start at rest have none.
     let half = half.filter(|half| half.is_finite());
-    let sampling =
-        sampling.and(half).map_or(String::new(), |half| format!("sampling ±{} %; ", rounded(100.0 * half, 2)));
+    let sampling = match sampling.and(half) {
+        Some(half) => format!("sampling ±{} %; ", rounded(100.0 * half, 2)),
+        None if bounds.is_none() && cell.limits.is_none() && cell.times.sample.len() > 1 => {
+            "sampling not known: too few members relaxed; ".into()
+        }
+        None => String::new(),
+    };
     let Some(discretisation) = &cell.discretisation else {
         if cell.limits.is_some() {
             return String::new();
@@ -277,13 +282,16 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     }
     let percent = |value: f64| rounded(100.0 * value, 2);
     let [mean_told, error] = [mean, error].map(percent);
-    let about = format!("{sampling}discretisation {mean_told} % ± {error} % (estimated from {members} {known})");
+    let about = match members {
+        1 => format!("{sampling}discretisation {mean_told} % (estimated from 1 member)"),
+        _ => format!("{sampling}discretisation {mean_told} % ± {error} % (estimated from {members} {known})"),
+    };
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
         () if not_asymptotic > 0 => {
             format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
         }
-        () if spec.refine => ": t_limit is free of it".into(),
+        () if spec.refine => ", removed from t_limit".into(),
         () if larger && spec.has_vesicles_in(cell.cell) => {
             " dominates; more --points lessen it, or --accurate in f64".into()
         }
@@ -299,7 +307,8 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
     let scale = &of.scale;
     let fitted = of.law.map(|PowerLaw { exponent, exponent_error, count, goodness, .. }| {
         let error = exponent_error.map_or(String::new(), |error| format!(", standard error {}", significant(error)));
-        let exponent = format!("{}{error}", significant(exponent));
+        let none = exponent_error.is_some_and(|error| exponent.abs() < 2.0 * error);
+        let exponent = format!("{}{error}{}", significant(exponent), if none { ", consistent with 0" } else { "" });
         let fit = goodness.map(|GoodnessOfFit { statistic, degrees_of_freedom, p_value: p }| {
             format!("chi2 = {} with {}, {}", significant(statistic), degrees(degrees_of_freedom), p_value(p))
         });

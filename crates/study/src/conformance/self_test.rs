@@ -22,8 +22,8 @@ const MEMBERS: usize = LAWS;
 const STEPS: u32 = 2;
 /// Tolerance of adaptive steps.
 const ADAPTIVE: f64 = 1e-3;
-/// The same in units of ε, if that is larger: rounding, which is not the same on all devices, must not decide how much a
-/// step may grow.
+/// The same in units of ε, if that is larger: rounding, which is not the same on all devices, must not decide how much
+/// a step may grow.
 const ABOVE_ROUNDING: f64 = 4e5;
 /// Length of a single one, over a fixed step.
 const SHORT: f64 = 0.005;

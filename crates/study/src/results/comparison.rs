@@ -177,7 +177,8 @@ impl CellComparison {
             return CellComparison::Single;
         }
         CellComparison::Refused(
-            "members are copies of the same outlines, not independent draws; use --curves 1, a member for each".into(),
+            "members are copies of the same outlines, not independent draws; leave out --curves for one member of each"
+                .into(),
         )
     }
 

@@ -57,21 +57,23 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             count(cell.members(), "member")
         ),
         Some((all, _)) if of_each && 2.0 * rounding(cell) > all => format!(
-            "{} of it is what rounding corners does: use a smaller --rounding, or a larger number",
+            "{} of it is what rounding corners does: use a smaller --rounding, or a larger --accuracy",
             rounded(rounding(cell), 2)
         ),
         Some(_) if of_each => {
             format!(
-                "t_error tells which members are not known that well at n = {points}: use more --points, or a larger number"
+                "t_error tells which members are not known that well at n = {points}: use more --points, or a larger --accuracy"
             )
         }
         Some((all, discretisation)) if 2.0 * discretisation > all => {
             let discretisation = rounded(discretisation, 2);
-            format!("{discretisation} of it is discretisation at n = {points}: use more --points, or a larger number")
+            format!(
+                "{discretisation} of it is discretisation at n = {points}: use more --points, or a larger --accuracy"
+            )
         }
         Some(_) => match needed(cell, goal) {
             Some(members) => format!(
-                "sampling alone needs about {} members in each cell: use more --curves to begin with, or a larger number",
+                "sampling alone needs about {} members in each cell: use more --curves to begin with, or a larger --accuracy",
                 rounded(members, 2)
             ),
             None => "use more --curves to begin with".into(),

@@ -82,9 +82,9 @@ impl MollifiedMembers {
     /// What their outlines were taken as, and how corners were rounded; `None` if there are none.
     pub fn outlines(&self) -> Option<String> {
         let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = *self;
-        let parts = [(splines, "spline"), (cornered, "spline with corners"), (polygons, "polygon")];
+        let parts = [(splines, "by a spline"), (cornered, "by a spline with corners"), (polygons, "as a polygon")];
         let parts = parts.into_iter().filter(|(count, _)| *count > 0);
-        let parts: Vec<String> = parts.map(|(count, what)| format!("{count} as a {what}")).collect();
+        let parts: Vec<String> = parts.map(|(count, what)| format!("{count} interpolated {what}")).collect();
         let change = significant(100.0 * outline_area_change, 2);
         let round = match rounded {
             0 => String::new(),

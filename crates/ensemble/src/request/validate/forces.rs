@@ -23,12 +23,8 @@ impl Spec {
         };
         let refused = |problem: &str, allowed: &str| Err(Error::value(key, &value, problem, allowed));
         if self.flow != Flow::SurfaceDiffusion.into() {
-            let problem = format!(
-                "only surface diffusion has one that depends on the direction, and the scheme has b(k) of --flow {} for a \
-                 constant one only",
-                self.flow
-            );
-            return refused(&problem, "leave out one of the two");
+            let problem = format!("--flow {} has none, only surface-diffusion has", self.flow);
+            return refused(&problem, &format!("leave out --{key} or --flow"));
         }
         self.check_geometric("with it a crystal creeps at rest", &format!("--{key} {value}"))?;
         let highest = self.highest_wave().unwrap_or(0);
@@ -137,7 +133,7 @@ impl Spec {
         let Some(reduced) = &self.reduced_area else { return Ok(()) };
         let refused = |problem: &str, allowed: &str| Err(Error::value("reduced-area", reduced, problem, allowed));
         if self.conserve != Some(Conserved::AreaAndLength) && !self.sweep.has("conserve") {
-            return refused("it changes unless area and length are kept", "add --conserve area,length");
+            return refused("it is kept only with --conserve area,length", "add that");
         }
         if let Some(at) = &self.conserve_at {
             let problem = format!("--conserve-at {} gives another one", listed(at));

@@ -4,7 +4,7 @@ use super::*;
 const REFUSED: &[(&str, &str)] = &[
     ("curves = 0", "--curves 0: "),
     ("curves = 1000000001", "--curves 1000000001: "),
-    ("points = 0", "--points 0: a ring of fewer than 6 nodes cannot be coloured; use 6 to 1000000"),
+    ("points = 0", "--points 0: the scheme needs 6 nodes; use 6 to 1000000"),
     ("points = 5", "--points 5: "),
     ("points = 1000001", "--points 1000001: "),
     ("threads = 0", "--threads 0: "),
@@ -133,10 +133,7 @@ const REFUSED: &[(&str, &str)] = &[
         "drive = 0.5\nflow = 'willmore'\nconserve = 'area'",
         "--drive 0.5: --conserve area is given, and the pressure that keeps the area takes any force away; leave out one",
     ),
-    (
-        "reduced-area = 0.7",
-        "--reduced-area 0.7: it changes unless area and length are kept; add --conserve area,length",
-    ),
+    ("reduced-area = 0.7", "--reduced-area 0.7: it is kept only with --conserve area,length; add that"),
     (
         "reduced-area = 1.1\nflow = 'willmore'\nconserve = 'area,length'",
         "--reduced-area 1.1: not 4 pi A/L^2 of a curve that nodes resolve; use a number from 0.05 to 1",

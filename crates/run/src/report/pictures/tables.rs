@@ -82,7 +82,7 @@ impl FinishedRun<'_> {
         };
         let tests = self.statistics.group_comparisons.iter().filter_map(|comparison| match comparison.log_rank() {
             Some(test) => {
-                Some(format!("log-rank test that all groups have one distribution: {}", p_value(test.p_value)))
+                Some(format!("log-rank test that all groups have the same distribution: {}", p_value(test.p_value)))
             }
             None => comparison.refusal().map(|why| format!("not compared: {why}")),
         });
@@ -144,7 +144,7 @@ impl FinishedRun<'_> {
         let left_out = ["left out: later", "earlier", "unknown"];
         Some(PageTable {
             caption: format!(
-                "{} less that of the same member of cell 0: pairs that both relaxed (Wilcoxon's signed-rank test), and \
+                "{} minus that of the same member of cell 0: pairs that both relaxed (Wilcoxon signed-rank test), and \
                  pairs left out because a member did not",
                 self.statistics.time()
             ),
