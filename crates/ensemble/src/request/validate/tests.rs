@@ -76,7 +76,10 @@ const REFUSED: &[(&str, &str)] = &[
     ("adaptive = 9e-6\nprecision = 'f32'", "--adaptive 9e-6: the rounding of the precision is larger; use 1e-5"),
     ("adaptive = 0.001\ntau = 0.001", "--tau 0.001: steps are either fixed or adaptive"),
     ("adaptive = 0.001\nomega = 1e9", "--omega 1000000000: adaptive steps are at most about 1/omega long"),
-    ("energy = 'cos:4,0.03'\nflow = 'willmore'", "--energy cos:4,0.03: only surface diffusion has one that depends"),
+    (
+        "energy = 'cos:4,0.03'\nflow = 'willmore'",
+        "--energy cos:4,0.03: --flow willmore has none, only surface-diffusion has",
+    ),
     (
         "energy = 'cos:4,0.03'\nform = 'paper'",
         "--form paper: with it a crystal creeps at rest, and --energy cos:4,0.03",
