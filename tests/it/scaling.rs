@@ -39,6 +39,7 @@ const COLUMNS: [(&str, i32); 19] = [
 /// Columns that must agree to rounding if the scale is not a power of two.
 const SOLID: [&str; 7] = ["t_relax", "t_half", "length_start", "length_end", "area_start", "area_end", "excess_start"];
 
+/// Bound of what differs by rounding alone, in f64.
 const ROUNDING: f64 = 1e-8;
 
 /// A table of points `s` times as large.

@@ -7,11 +7,12 @@ use glam::DVec2;
 
 use super::{
     axis::{Axis, Scale, range},
+    empty::{NOTHING, say},
     medium::Medium,
     style,
     svg::{Svg, coordinate, dots},
     trace,
-    width::{SIZE, TITLE, distinct, shortened, width, wrapped},
+    width::{LINE, SIZE, TITLE, distinct, shortened, width, wrapped},
 };
 use curvelax_base::{interval::Interval, text::significant};
 
@@ -23,7 +24,6 @@ pub const FOOT: f64 = 52.0;
 pub const HEADING: f64 = 22.0;
 
 const TITLE_LINE: f64 = 20.0;
-const LINE: f64 = 17.0;
 /// Most pixels of a name next to a colour bar.
 const MAX_NAME: f64 = 90.0;
 const LEGEND_LINE: f64 = 20.0;
@@ -216,7 +216,7 @@ impl Heading<'_> {
         (svg, top)
     }
 
-    /// A picture with this heading that says why there is nothing to draw, recognised by [`reason`].
+    /// A picture with this heading that says why there is nothing to draw; [`reason`](super::empty::reason) finds it.
     pub fn nothing(&self, medium: Medium, reason: &str) -> String {
         let (mut svg, top) = self.begin(medium, 180.0);
         svg.open(NOTHING);
@@ -377,26 +377,6 @@ impl Panel<'_> {
         let at = DVec2::new(self.corner.x - from_left, self.corner.y + 0.5 * self.size.y);
         svg.text_upwards("axis middle", at, &name);
     }
-}
-
-/// Writes a sentence into an empty frame, if there is nothing to draw in it.
-pub fn say(svg: &mut Svg, corner: DVec2, size: DVec2, sentence: &str) {
-    svg.rectangle("frame", corner, size, 0.0);
-    let lines = wrapped(sentence, SIZE, size.x - 24.0);
-    let first = corner + 0.5 * size - DVec2::new(0.0, 0.5 * LINE * (lines.len() as f64 - 1.0) - 4.0);
-    for (i, line) in lines.iter().enumerate() {
-        svg.text("note middle", first + DVec2::new(0.0, i as f64 * LINE), line);
-    }
-}
-
-/// Class of the sentence in the place of a picture.
-const NOTHING: &str = "nothing";
-
-/// Why there is nothing to draw, of a picture that only says so, as text of XML.
-pub fn reason(svg: &str) -> Option<String> {
-    let (_, group) = svg.split_once(&format!("<g class=\"{NOTHING}\">"))?;
-    let lines = group.split("</text>").filter_map(|line| line.rsplit_once('>')).map(|(_, words)| words);
-    Some(lines.filter(|words| !words.trim().is_empty()).collect::<Vec<_>>().join(" "))
 }
 
 /// The sample of an entry of a legend by itself, as the text of an SVG file.

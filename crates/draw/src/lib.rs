@@ -4,6 +4,7 @@
 pub mod axis;
 pub mod chart;
 pub mod charts;
+pub mod empty;
 pub mod gif;
 pub mod medium;
 pub mod plot;

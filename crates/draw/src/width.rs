@@ -13,6 +13,8 @@ const ADVANCE: [u8; 95] = [
 
 /// Size of most text, in pixels.
 pub const SIZE: f64 = 12.0;
+/// Pixels from one line of it to the next.
+pub const LINE: f64 = 17.0;
 /// Size of a title, as a multiple of [`SIZE`] that includes its bold face.
 pub const TITLE: f64 = 15.0 * 1.13;
 

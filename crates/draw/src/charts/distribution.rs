@@ -8,7 +8,8 @@ use glam::DVec2;
 use super::{PanelGrid, TIME};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, MARGIN, Panel, say},
+    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, MARGIN, Panel},
+    empty::say,
     medium::Medium,
     svg::{Svg, coordinate, dots},
     width::{SIZE, distinct, shortened, width},

@@ -8,7 +8,8 @@ use super::{
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, say},
+    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel},
+    empty::say,
     medium::Medium,
     svg::Svg,
     width::{SIZE, shortened},

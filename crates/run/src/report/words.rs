@@ -282,10 +282,9 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     }
     let percent = |value: f64| rounded(100.0 * value, 2);
     let [mean_told, error] = [mean, error].map(percent);
-    let about = match members {
-        1 => format!("{sampling}discretisation {mean_told} % (estimated from 1 member)"),
-        _ => format!("{sampling}discretisation {mean_told} % ± {error} % (estimated from {members} {known})"),
-    };
+    // The bar of one member is not the spread of all.
+    let spread = if members == 1 { String::new() } else { format!(" ± {error} %") };
+    let about = format!("{sampling}discretisation {mean_told} %{spread} (estimated from {members} {known})");
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
         () if not_asymptotic > 0 => {

@@ -14,7 +14,8 @@ pub use player::{MAX_MEMBERS, MovingMember, spread};
 
 use curvelax_base::text::{count, grouped};
 use curvelax_draw::{
-    chart::{Entry, reason, sample},
+    chart::{Entry, sample},
+    empty::reason,
     svg::escape,
 };
 use player::{Player, colour};
