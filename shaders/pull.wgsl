@@ -16,8 +16,8 @@ fn turn(wx: Window, wy: Window) -> Turn {
 /// Pulls the new curvatures and lengths of a step.
 fn pull() {
     let rate = all_parameters[member].pull * tau;
-    let share = real(1.0) / (real(1.0) + rate);
+    let share = rate / (real(1.0) + rate);
     let turned = turn(new_x, new_y);
-    new_k = (new_k + rate * (turned.angle / turned.span)) * share;
-    new_r = (new_r + rate * (turned.edge - vec(all_parameters[member].r_offset))) * share;
+    new_k += share * (turned.angle / turned.span - new_k);
+    new_r += share * ((turned.edge - vec(all_parameters[member].r_offset)) - new_r);
 }

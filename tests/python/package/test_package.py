@@ -625,8 +625,8 @@ class Package(unittest.TestCase):
     def test_messages_name_keywords_and_not_flags(self):
         self.assertRegex(self.refused(points=5), r"^points=5: .* use 6 to")
         self.assertIn("use points=160 or more", self.refused(modes="2..=40", points=40))
-        self.assertIn("`t_end`", self.refused(curvs=3))
-        self.assertNotIn("`t-end`", self.refused(curvs=3))
+        self.assertIn("did you mean `t_end`?", self.refused(t_ed=3))
+        self.assertNotIn("`t-end`", self.refused(t_ed=3))
         with self.assertWarns(curvelax.CurvelaxWarning) as caught:
             study = curvelax.run(**{**SMALL, "t_end": 0.01})
         self.assertIn("use a longer t_end, or a larger relax_to", str(caught.warning))

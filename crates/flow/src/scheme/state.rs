@@ -369,7 +369,9 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        23 + S::FACTS.numbers_per_node + if N::IS_SHORT { 6 } else { 0 }
+        // Remainders, and what an elimination stores for other right-hand sides.
+        let refined = if S::FACTS.sweeps { 6 } else { 12 };
+        23 + S::FACTS.numbers_per_node + if N::IS_SHORT { refined } else { 0 }
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {

@@ -5,7 +5,8 @@
 //! a 2×2 system for `s`. The systems of the scheme are perturbations of `1 + (positive) D⁴`, for which
 //! elimination without pivoting is stable. O(n), no branch on the values.
 //!
-//! *Practice.* Equations are requested one after another and never stored, since memory traffic limits a step.
+//! *Practice.* Equations are requested one after another and never stored, since memory traffic limits a step. What
+//! other right-hand sides need of them is stored in short numbers, which solve for those, too.
 
 use super::{
     ring::Ring,
@@ -23,15 +24,41 @@ struct Eliminated<N, const F: usize> {
     border: [N; 2],
 }
 
-/// Storage for the triangular factor of an elimination: `n-2` rows.
+/// What made a row of the triangular factor: `g_i = (rhs_i - a·g_{i-2} - b·g_{i-1})·pivot`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Multipliers<N> {
+    a: N,
+    b: N,
+    pivot: N,
+}
+
+impl<N: Number> Multipliers<N> {
+    #[inline(always)]
+    fn eliminate(&self, rhs: N, above2: N, above1: N) -> N {
+        (rhs - self.a * above2 - self.b * above1) * self.pivot
+    }
+}
+
+/// Storage for the factors of an elimination.
 #[derive(Clone, Debug)]
-pub struct Factor<N, const F: usize>(Vec<Eliminated<N, F>>);
+pub struct Factor<N, const F: usize> {
+    /// The triangular factor: `n-2` rows.
+    rows: Vec<Eliminated<N, F>>,
+    /// What made them, in short numbers.
+    multipliers: Vec<Multipliers<N>>,
+    /// The last two equations.
+    last: [Equation<N, F>; 2],
+}
 
 impl<N: Number, const F: usize> Factor<N, F> {
     /// Allocates room for systems of `n` ≥ 6 equations, or none for `n` = 0.
     pub fn new(n: usize) -> Self {
-        let zero = N::default();
-        Factor(vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; n.saturating_sub(2)])
+        let (zero, core) = (N::default(), n.saturating_sub(2));
+        Factor {
+            rows: vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; core],
+            multipliers: vec![Multipliers::default(); if N::IS_SHORT { core } else { 0 }],
+            last: [Equation { a: zero, b: zero, c: zero, d: zero, e: zero, rhs: [zero; F], time_over_length: zero }; 2],
+        }
     }
 }
 
@@ -43,11 +70,48 @@ pub fn solve<N: Number, const F: usize>(
     unknown: [&mut Ring<N>; F],
     factor: &mut Factor<N, F>,
 ) -> N::Mask {
-    let core = factor.0.len();
-    let rows = &mut factor.0[..];
-    let [p, q] = eliminate(equations, rows);
-    substitute_back(rows);
-    let last = border_unknowns(&p, &q, rows);
+    eliminate(equations, factor);
+    substitute_back(&mut factor.rows);
+    finish(unknown, factor)
+}
+
+/// Like [`solve`] for the equations solved last, in short numbers, with other right-hand sides.
+#[inline(always)]
+pub fn solve_again<N: Number, const F: usize>(
+    rhs: &[Ring<N>; F],
+    unknown: [&mut Ring<N>; F],
+    factor: &mut Factor<N, F>,
+) -> N::Mask {
+    let Factor { rows, multipliers, last } = factor;
+    let core = rows.len();
+    let (mut above2, mut above1) = ([N::of(0.0); F], [N::of(0.0); F]);
+    for (i, row) in rows.iter_mut().enumerate() {
+        for f in 0..F {
+            row.g[f] = multipliers[i].eliminate(rhs[f][i], above2[f], above1[f]);
+        }
+        (above2, above1) = (above1, row.g);
+    }
+    let (mut below1, mut below2) = (above1, above1);
+    for row in rows[..core - 1].iter_mut().rev() {
+        for f in 0..F {
+            row.g[f] = row.g[f] - row.d * below1[f] - row.e * below2[f];
+        }
+        (below2, below1) = (below1, row.g);
+    }
+    for (c, equation) in last.iter_mut().enumerate() {
+        for f in 0..F {
+            equation.rhs[f] = rhs[f][core + c];
+        }
+    }
+    finish(unknown, factor)
+}
+
+/// Writes the solution, once `factor` has been substituted back.
+#[inline(always)]
+fn finish<N: Number, const F: usize>(unknown: [&mut Ring<N>; F], factor: &Factor<N, F>) -> N::Mask {
+    let Factor { rows, last: [p, q], .. } = factor;
+    let core = rows.len();
+    let last = border_unknowns(p, q, rows);
     let mut largest = N::of(0.0);
     for (f, u) in unknown.into_iter().enumerate() {
         for (i, row) in rows.iter().enumerate() {
@@ -64,19 +128,15 @@ pub fn solve<N: Number, const F: usize>(
     largest.le(N::of(BIG))
 }
 
-/// Fills `rows`; returns the last two equations.
+/// Fills `factor`.
 #[inline(always)]
-fn eliminate<N: Number, const F: usize>(
-    equations: &impl Equations<N, F>,
-    rows: &mut [Eliminated<N, F>],
-) -> [Equation<N, F>; 2] {
+fn eliminate<N: Number, const F: usize>(equations: &impl Equations<N, F>, factor: &mut Factor<N, F>) {
+    let Factor { rows, multipliers, last } = factor;
     let core = rows.len();
     let zero = N::of(0.0);
     let none = Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] };
     let (mut above2, mut above1) = (none, none);
-    // Filled by the loop, in which the body of an equation is compiled once.
-    let mut last =
-        [Equation { a: zero, b: zero, c: zero, d: zero, e: zero, rhs: [zero; F], time_over_length: zero }; 2];
+    // One loop for all, in which the body of an equation is compiled once.
     for i in 0..core + 2 {
         let mut own = equations.equation(i);
         if i >= core {
@@ -99,17 +159,20 @@ fn eliminate<N: Number, const F: usize>(
         // Row i minus a times the row two above leaves b' on z_{i-1}; minus b' times the row above leaves the pivot.
         let b = own.b - own.a * above2.d;
         let pivot = (own.c - own.a * above2.e - b * above1.d).recip();
+        let by = Multipliers { a: own.a, b, pivot };
         let mut row = Eliminated { d: (own.d - b * above1.e) * pivot, e: own.e * pivot, g: own.rhs, border };
         for f in 0..F {
-            row.g[f] = (own.rhs[f] - own.a * above2.g[f] - b * above1.g[f]) * pivot;
+            row.g[f] = by.eliminate(own.rhs[f], above2.g[f], above1.g[f]);
         }
         for c in 0..2 {
-            row.border[c] = (border[c] - own.a * above2.border[c] - b * above1.border[c]) * pivot;
+            row.border[c] = by.eliminate(border[c], above2.border[c], above1.border[c]);
         }
         rows[i] = row;
+        if N::IS_SHORT {
+            multipliers[i] = by;
+        }
         (above2, above1) = (above1, row);
     }
-    last
 }
 
 #[inline(always)]
@@ -157,7 +220,7 @@ fn border_unknowns<N: Number, const F: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::system::tests::test_system;
+    use crate::solver::system::{Row, System, tests::test_system};
 
     #[test]
     fn the_residual_of_the_direct_solution_is_rounding_error() {
@@ -173,6 +236,37 @@ mod tests {
                     assert!(worst <= 40.0 * f64::EPSILON * size, "n = {n}, stiffness {stiffness}: {worst:e}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn other_right_hand_sides_are_solved_for_as_if_they_were_the_first() {
+        for n in [6, 7, 50, 101] {
+            let double = test_system(n, 10.0);
+            let f32s = |numbers: &[f64]| numbers.iter().map(|v| *v as f32).collect::<Vec<f32>>();
+            let [x, y] = [f32s(&double.rhs[0]), f32s(&double.rhs[1])];
+            let row = |row: &Row<f64>| Row {
+                a: row.a as f32,
+                b: row.b as f32,
+                d: row.d as f32,
+                e: row.e as f32,
+                weight: row.weight as f32,
+            };
+            let rows: Vec<Row<f32>> = double.rows.iter().map(row).collect();
+            let other = System { rows: rows.clone(), rhs: [y.clone(), x.clone()] };
+            let system = System { rows, rhs: [x, y] };
+            let solved = |system: &System<f32, 2>, factor: &mut Factor<f32, 2>| {
+                let mut u = [Ring::zeros(n), Ring::zeros(n)];
+                assert!(solve(system, u.each_mut(), factor));
+                u
+            };
+            let mut factor = Factor::new(n);
+            let first = solved(&system, &mut factor);
+            let rhs = other.rhs.each_ref().map(|rhs| Ring::from_nodes(rhs.iter().copied()));
+            let mut again = [Ring::zeros(n), Ring::zeros(n)];
+            assert!(solve_again(&rhs, again.each_mut(), &mut factor));
+            assert_eq!(again, solved(&other, &mut Factor::new(n)), "n = {n}");
+            assert_ne!(again, first);
         }
     }
 }

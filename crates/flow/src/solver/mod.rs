@@ -127,20 +127,20 @@ pub trait Solves: 'static {
         live: N::Mask,
     ) -> Swept<N>;
 
-    /// Makes one round of a [refinement](refinement::solve), which solves `system` for `lacks`, whose values do not
-    /// matter; rounds before it have made `made` sweeps. Converged are the lanes that may continue.
-    #[inline(always)]
+    /// Makes one round of a [refinement](refinement::solve), in short numbers: solves for `lacks`, whose values do not
+    /// matter, `system` with the right-hand sides `left`. Earlier solves of it and rounds have made `made` sweeps.
+    /// Converged are the lanes that may continue.
+    #[expect(clippy::too_many_arguments)]
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
+        left: &[Ring<N>; F],
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         blocks: Blocks,
         control: &Control<N>,
-        _made: N,
+        made: N,
         live: N::Mask,
-    ) -> Swept<N> {
-        Self::solve(system, lacks, memory, blocks, control, live)
-    }
+    ) -> Swept<N>;
 }
 
 /// The name, needs and properties of a solver.
@@ -230,6 +230,7 @@ impl Solves for Sweeps {
     #[inline(always)]
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
+        left: &[Ring<N>; F],
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         blocks: Blocks,
@@ -237,7 +238,7 @@ impl Solves for Sweeps {
         made: N,
         live: N::Mask,
     ) -> Swept<N> {
-        memory.system.assemble(system);
+        memory.system.assemble(&refinement::Remaining { of: system, left });
         gauss_seidel::sweep_round(&memory.system, lacks, blocks, control, made, live)
     }
 }
@@ -269,7 +270,20 @@ impl Solves for Elimination {
         _: &Control<N>,
         _: N::Mask,
     ) -> Swept<N> {
-        let finite = direct::solve(system, unknown, &mut memory.factor);
-        Swept { sweeps: N::of(0.0), converged: finite, finite }
+        Swept::without_sweeps(direct::solve(system, unknown, &mut memory.factor))
+    }
+
+    #[inline(always)]
+    fn round<N: Number, const F: usize>(
+        _: &impl Equations<N, F>,
+        left: &[Ring<N>; F],
+        lacks: [&mut Ring<N>; F],
+        memory: &mut Memory<N, F>,
+        _: Blocks,
+        _: &Control<N>,
+        _: N,
+        _: N::Mask,
+    ) -> Swept<N> {
+        Swept::without_sweeps(direct::solve_again(left, lacks, &mut memory.factor))
     }
 }

@@ -31,9 +31,11 @@ impl<N: Number, const F: usize> Remainder<N, F> {
 }
 
 /// The equations for what a solution lacks.
-struct Remaining<'a, N, E, const F: usize> {
-    of: &'a E,
-    left: &'a [Ring<N>; F],
+pub struct Remaining<'a, N, E, const F: usize> {
+    /// The equations.
+    pub of: &'a E,
+    /// What the solution leaves of their right-hand sides.
+    pub left: &'a [Ring<N>; F],
 }
 
 impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remaining<'_, N, E, F> {
@@ -52,14 +54,11 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     }
 }
 
-/// Solves `equations`, and refines the solution if `control` says so.
-///
-/// The first solve of a direct solver is one for what zero lacks, so that its body is compiled once: it takes most of
-/// the time of the compiler. Sweeps start from `unknown`.
+/// Solves `equations`, and refines the solution if `control` says so. Sweeps start from `unknown`.
 #[inline(always)]
 pub fn solve<N: Number, S: Solves, const F: usize>(
     equations: &impl Equations<N, F>,
-    unknown: [&mut Ring<N>; F],
+    mut unknown: [&mut Ring<N>; F],
     memory: &mut Memory<N, F>,
     remainder: &mut Remainder<N, F>,
     blocks: Blocks,
@@ -72,23 +71,25 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
     let Remainder { left, lacks } = remainder;
     let mut all = Swept { sweeps: N::of(0.0), converged: live, finite: live };
     let mut made = 0;
-    loop {
-        let first = made == 0 && !S::FACTS.sweeps;
+    if !S::FACTS.sweeps {
+        all = S::solve(equations, unknown.each_mut().map(|ring| &mut **ring), memory, blocks, control, live);
+        live = live.and(all.converged).and(N::of(1.0).le(control.refinements));
+        made = 1;
+    }
+    while live.any() {
         for i in 0..blocks.n {
             let rhs = equations.equation(i).rhs;
             for f in 0..F {
-                left[f][i] = if first { rhs[f] } else { rhs[f] - equations.applied(i, unknown[f]) };
+                left[f][i] = rhs[f] - equations.applied(i, unknown[f]);
             }
         }
-        let remaining = Remaining { of: equations, left };
-        let swept = S::round(&remaining, lacks.each_mut(), memory, blocks, control, all.sweeps, live);
+        let swept = S::round(equations, left, lacks.each_mut(), memory, blocks, control, all.sweeps, live);
         all.sweeps += swept.sweeps;
         all.converged = all.converged.and(swept.converged.or(live.not()));
         all.finite = all.finite.and(swept.finite.or(live.not()));
         for f in 0..F {
             for i in 0..blocks.n {
-                let solved = if first { lacks[f][i] } else { unknown[f][i] + lacks[f][i] };
-                unknown[f][i] = N::select(live, solved, unknown[f][i]);
+                unknown[f][i] = N::select(live, unknown[f][i] + lacks[f][i], unknown[f][i]);
             }
             unknown[f].close();
         }
@@ -101,11 +102,9 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
         } else {
             live = live.and(control.refinements.le(N::of(f64::from(made))).not());
         }
-        if !live.any() {
-            return all;
-        }
         made += 1;
     }
+    all
 }
 
 /// Judges a round of sweeps by the largest change that it made to the unknown, and the largest of that: whether it is

@@ -51,6 +51,14 @@ pub struct Swept<N: Number> {
     pub finite: N::Mask,
 }
 
+impl<N: Number> Swept<N> {
+    /// Returns the result of a solver that makes no sweeps.
+    #[inline(always)]
+    pub fn without_sweeps(finite: N::Mask) -> Self {
+        Swept { sweeps: N::of(0.0), converged: finite, finite }
+    }
+}
+
 /// The stopping criterion for the sweeps on a system.
 pub(super) struct Target<N: Number> {
     /// See [`system_size`].
