@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use tempfile::TempDir;
+
 use crate::common::{
     command,
     program::{Row, column, number, run},
@@ -125,6 +127,21 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
     assert!(((t - small) / left - 1.0).abs() < 1e-3, "{t} {small} {left}");
     // The area falls at the rate F L, and theory has no rate.
     assert_eq!(done.rows("rates.csv")[0]["rate_theory"], "");
+}
+
+#[test]
+fn the_overview_says_that_members_that_relaxed_vanished_afterwards() {
+    let home = TempDir::new().unwrap();
+    let told = |shape: &str| {
+        let rest = "--amplitude 0 --curves 3 --points 40 --drive 1 --adaptive --pull auto --t-end auto --backend cpu";
+        let told = command::done(home.path(), &format!("run {rest} --shape {shape} --out {}", shape.len()));
+        (told.contains("over 3 members that relaxed; 3 vanished afterwards"), told)
+    };
+    let (both, words) = told("ellipse:2,1");
+    assert!(both, "{words}");
+    // A circle is round from the start.
+    let (both, words) = told("circle:1");
+    assert!(!both, "{words}");
 }
 
 #[test]

@@ -48,6 +48,21 @@ fn steps(place: f32) -> i32 {
     (place.to_bits() as i32).wrapping_sub(ORIGIN)
 }
 
+/// Returns the integer nearest to `way`, which is at most [`FARTHEST`] in size; of two as near, the even one.
+///
+/// By additions and bits, which become vector instructions: a cast that saturates is made lane by lane. A number near
+/// `1.5·2^(23+s)` is a multiple of `2^s`, and its bits count them. First come multiples of 2¹², then what they leave.
+#[inline(always)]
+fn whole(way: f32) -> i32 {
+    const FOR_ONE: f32 = 12_582_912.0;
+    const SHIFT: u32 = 12;
+    const FOR_MANY: f32 = FOR_ONE * (1 << SHIFT) as f32;
+    let count = |sum: f32, of: f32| (sum.to_bits() as i32).wrapping_sub(of.to_bits() as i32);
+    let many = way + FOR_MANY;
+    let rest = way - (many - FOR_MANY);
+    (count(many, FOR_MANY) << SHIFT).wrapping_add(count(rest + FOR_ONE, FOR_ONE))
+}
+
 #[inline(always)]
 fn held(steps: i32) -> f32 {
     f32::from_bits((steps.clamp(-RIM, RIM) + ORIGIN) as u32)
@@ -61,7 +76,7 @@ impl NodePlace for f32 {
     #[inline(always)]
     fn moved(place: f32, by: f32) -> f32 {
         let way = by * PER_UNIT;
-        let end = steps(place).wrapping_add(way.round_ties_even() as i32);
+        let end = steps(place).wrapping_add(whole(way));
         held(if way.abs() <= FARTHEST { end } else { RIM })
     }
     #[inline(always)]
@@ -139,6 +154,13 @@ mod tests {
             assert_eq!(f32::apart(from, to), (expected - f32::exact(from)) as f32, "from {} by {by}", f32::exact(from));
             assert_eq!(f32::coordinate(to), expected as f32, "{expected}");
         }
+    }
+
+    #[test]
+    fn an_increment_half_way_between_two_steps_goes_to_the_even_one() {
+        let ways = [0.5, 1.5, 2.5, -0.5, -1.5, -2.5, 2047.5, 2048.5, 6143.5, 4_194_303.5, FARTHEST, -FARTHEST];
+        assert_eq!(ways.map(whole), ways.map(|way| way.round_ties_even() as i32));
+        assert_ne!(ways.map(whole), ways.map(|way| way.round() as i32));
     }
 
     #[test]

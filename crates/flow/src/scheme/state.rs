@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{Parameters, law::Law};
 use crate::{
     number::{Number, Real},
-    solver::{Blocks, Memory, Ring, Solves, refinement::Remainder},
+    solver::{Blocks, Memory, Ring, Solves},
 };
 
 /// Fields of a curve.
@@ -343,9 +343,9 @@ pub struct Workspace<N> {
     /// The position system and its solver.
     pub position: Memory<N, 2>,
     /// What a refined curvature lacks; empty in f64.
-    pub of_curvature: Remainder<N, 1>,
+    pub lacks_curvature: [Ring<N>; 1],
     /// What refined positions lack; empty in f64.
-    pub of_position: Remainder<N, 2>,
+    pub lacks_positions: [Ring<N>; 2],
     /// How far the nodes of the new curve have moved, where forces move them.
     pub by: [Ring<N>; 2],
     /// The gradients of the new curve's area and length, x and y of each, where they are kept.
@@ -369,14 +369,15 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        // Remainders, and what an elimination stores for other right-hand sides.
-        let refined = if S::FACTS.sweeps { 6 } else { 12 };
+        // What solutions lack, and what an elimination stores for them.
+        let refined = if S::FACTS.sweeps { 3 } else { 12 };
         23 + S::FACTS.numbers_per_node + if N::IS_SHORT { refined } else { 0 }
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {
         let n = blocks.n;
         let ring = || Ring::zeros(n);
+        let short_ring = || Ring::zeros(if N::IS_SHORT { n } else { 0 });
         let nodes = || vec![N::default(); n];
         Workspace {
             blocks,
@@ -401,8 +402,8 @@ impl<N: Number> Workspace<N> {
             new: Curve::zeros(n),
             curvature,
             position,
-            of_curvature: Remainder::zeros(if N::IS_SHORT { n } else { 0 }),
-            of_position: Remainder::zeros(if N::IS_SHORT { n } else { 0 }),
+            lacks_curvature: [short_ring()],
+            lacks_positions: [short_ring(), short_ring()],
             by: std::array::from_fn(|_| ring()),
             gradients: std::array::from_fn(|_| ring()),
             refinements: N::of(1.0),

@@ -102,7 +102,8 @@ pub fn step_by<N: Number, S: Solves>(
     method: &Method,
     work: &mut Workspace<N>,
 ) -> Stepped<N> {
-    let Workspace { blocks, motion, new, curvature, position, of_curvature, of_position, by, gradients, .. } = work;
+    let Workspace { blocks, motion, new, curvature, position, lacks_curvature, lacks_positions, by, gradients, .. } =
+        work;
     let refined = branches.is_refined::<N>();
     // Not compiled for members side by side, which nobody traces.
     let traced = N::LANES == 1 && work.traced;
@@ -126,7 +127,7 @@ pub fn step_by<N: Number, S: Solves>(
         curvature.system.assemble(&equations);
     }
     let unknown = [&mut increments.k];
-    let for_k = refinement::solve::<N, S, 1>(&equations, unknown, curvature, of_curvature, *blocks, &control, live);
+    let for_k = refinement::solve::<N, S, 1>(&equations, unknown, curvature, lacks_curvature, *blocks, &control, live);
     state::advance(2, &old.k, &increments.k, &mut new.k);
 
     if branches.geometric {
@@ -138,7 +139,7 @@ pub fn step_by<N: Number, S: Solves>(
     }
     let control = Control { negligible: rounding * radius, ..control };
     let unknowns = [&mut increments.x, &mut increments.y];
-    let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, of_position, *blocks, &control, live);
+    let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, lacks_positions, *blocks, &control, live);
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
         forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);

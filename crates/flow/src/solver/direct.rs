@@ -5,8 +5,8 @@
 //! a 2×2 system for `s`. The systems of the scheme are perturbations of `1 + (positive) D⁴`, for which
 //! elimination without pivoting is stable. O(n), no branch on the values.
 //!
-//! *Practice.* Equations are requested one after another and never stored, since memory traffic limits a step. What
-//! other right-hand sides need of them is stored in short numbers, which solve for those, too.
+//! *Practice.* Equations are requested one after another and never stored, since memory traffic limits a step. Short
+//! numbers, whose solutions are refined, store what that needs of them.
 
 use super::{
     ring::Ring,
@@ -25,14 +25,15 @@ struct Eliminated<N, const F: usize> {
 }
 
 /// What made a row of the triangular factor: `g_i = (rhs_i - a·g_{i-2} - b·g_{i-1})·pivot`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Multipliers<N> {
+#[derive(Clone, Copy, Debug)]
+struct Source<N, const F: usize> {
     a: N,
     b: N,
     pivot: N,
+    rhs: [N; F],
 }
 
-impl<N: Number> Multipliers<N> {
+impl<N: Number, const F: usize> Source<N, F> {
     #[inline(always)]
     fn eliminate(&self, rhs: N, above2: N, above1: N) -> N {
         (rhs - self.a * above2 - self.b * above1) * self.pivot
@@ -45,7 +46,7 @@ pub struct Factor<N, const F: usize> {
     /// The triangular factor: `n-2` rows.
     rows: Vec<Eliminated<N, F>>,
     /// What made them, in short numbers.
-    multipliers: Vec<Multipliers<N>>,
+    sources: Vec<Source<N, F>>,
     /// The last two equations.
     last: [Equation<N, F>; 2],
 }
@@ -56,7 +57,7 @@ impl<N: Number, const F: usize> Factor<N, F> {
         let (zero, core) = (N::default(), n.saturating_sub(2));
         Factor {
             rows: vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; core],
-            multipliers: vec![Multipliers::default(); if N::IS_SHORT { core } else { 0 }],
+            sources: vec![Source { a: zero, b: zero, pivot: zero, rhs: [zero; F] }; if N::IS_SHORT { core } else { 0 }],
             last: [Equation { a: zero, b: zero, c: zero, d: zero, e: zero, rhs: [zero; F], time_over_length: zero }; 2],
         }
     }
@@ -72,24 +73,36 @@ pub fn solve<N: Number, const F: usize>(
 ) -> N::Mask {
     eliminate(equations, factor);
     substitute_back(&mut factor.rows);
-    finish(unknown, factor)
+    finish(unknown, &factor.rows, &factor.last)
 }
 
-/// Like [`solve`] for the equations solved last, in short numbers, with other right-hand sides.
+/// Writes to `lacks` the solution for what `unknown` leaves of the right-hand sides of `equations`, which were solved
+/// last, in short numbers. Returns whether it is finite.
 #[inline(always)]
-pub fn solve_again<N: Number, const F: usize>(
-    rhs: &[Ring<N>; F],
-    unknown: [&mut Ring<N>; F],
+pub fn refine<N: Number, const F: usize>(
+    equations: &impl Equations<N, F>,
+    unknown: [&Ring<N>; F],
+    lacks: [&mut Ring<N>; F],
     factor: &mut Factor<N, F>,
 ) -> N::Mask {
-    let Factor { rows, multipliers, last } = factor;
-    let core = rows.len();
+    let Factor { rows, sources, last } = factor;
+    let (core, mut last) = (rows.len(), *last);
     let (mut above2, mut above1) = ([N::of(0.0); F], [N::of(0.0); F]);
-    for (i, row) in rows.iter_mut().enumerate() {
+    for i in 0..core + 2 {
+        let rhs = if i < core { sources[i].rhs } else { last[i - core].rhs };
+        let mut left = rhs;
         for f in 0..F {
-            row.g[f] = multipliers[i].eliminate(rhs[f][i], above2[f], above1[f]);
+            left[f] = rhs[f] - equations.applied(i, unknown[f]);
         }
-        (above2, above1) = (above1, row.g);
+        if i >= core {
+            last[i - core].rhs = left;
+            continue;
+        }
+        for f in 0..F {
+            left[f] = sources[i].eliminate(left[f], above2[f], above1[f]);
+        }
+        rows[i].g = left;
+        (above2, above1) = (above1, left);
     }
     let (mut below1, mut below2) = (above1, above1);
     for row in rows[..core - 1].iter_mut().rev() {
@@ -98,18 +111,16 @@ pub fn solve_again<N: Number, const F: usize>(
         }
         (below2, below1) = (below1, row.g);
     }
-    for (c, equation) in last.iter_mut().enumerate() {
-        for f in 0..F {
-            equation.rhs[f] = rhs[f][core + c];
-        }
-    }
-    finish(unknown, factor)
+    finish(lacks, rows, &last)
 }
 
-/// Writes the solution, once `factor` has been substituted back.
+/// Writes the solution, once `rows` have been substituted back.
 #[inline(always)]
-fn finish<N: Number, const F: usize>(unknown: [&mut Ring<N>; F], factor: &Factor<N, F>) -> N::Mask {
-    let Factor { rows, last: [p, q], .. } = factor;
+fn finish<N: Number, const F: usize>(
+    unknown: [&mut Ring<N>; F],
+    rows: &[Eliminated<N, F>],
+    [p, q]: &[Equation<N, F>; 2],
+) -> N::Mask {
     let core = rows.len();
     let last = border_unknowns(p, q, rows);
     let mut largest = N::of(0.0);
@@ -131,7 +142,7 @@ fn finish<N: Number, const F: usize>(unknown: [&mut Ring<N>; F], factor: &Factor
 /// Fills `factor`.
 #[inline(always)]
 fn eliminate<N: Number, const F: usize>(equations: &impl Equations<N, F>, factor: &mut Factor<N, F>) {
-    let Factor { rows, multipliers, last } = factor;
+    let Factor { rows, sources, last } = factor;
     let core = rows.len();
     let zero = N::of(0.0);
     let none = Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] };
@@ -159,17 +170,17 @@ fn eliminate<N: Number, const F: usize>(equations: &impl Equations<N, F>, factor
         // Row i minus a times the row two above leaves b' on z_{i-1}; minus b' times the row above leaves the pivot.
         let b = own.b - own.a * above2.d;
         let pivot = (own.c - own.a * above2.e - b * above1.d).recip();
-        let by = Multipliers { a: own.a, b, pivot };
+        let source = Source { a: own.a, b, pivot, rhs: own.rhs };
         let mut row = Eliminated { d: (own.d - b * above1.e) * pivot, e: own.e * pivot, g: own.rhs, border };
         for f in 0..F {
-            row.g[f] = by.eliminate(own.rhs[f], above2.g[f], above1.g[f]);
+            row.g[f] = source.eliminate(own.rhs[f], above2.g[f], above1.g[f]);
         }
         for c in 0..2 {
-            row.border[c] = by.eliminate(border[c], above2.border[c], above1.border[c]);
+            row.border[c] = source.eliminate(border[c], above2.border[c], above1.border[c]);
         }
         rows[i] = row;
         if N::IS_SHORT {
-            multipliers[i] = by;
+            sources[i] = source;
         }
         (above2, above1) = (above1, row);
     }
@@ -220,7 +231,10 @@ fn border_unknowns<N: Number, const F: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::system::{Row, System, tests::test_system};
+    use crate::solver::{
+        refinement::Remaining,
+        system::{Row, System, tests::test_system},
+    };
 
     #[test]
     fn the_residual_of_the_direct_solution_is_rounding_error() {
@@ -240,33 +254,24 @@ mod tests {
     }
 
     #[test]
-    fn other_right_hand_sides_are_solved_for_as_if_they_were_the_first() {
+    fn a_refinement_is_a_solve_for_what_is_left() {
         for n in [6, 7, 50, 101] {
-            let double = test_system(n, 10.0);
-            let f32s = |numbers: &[f64]| numbers.iter().map(|v| *v as f32).collect::<Vec<f32>>();
-            let [x, y] = [f32s(&double.rhs[0]), f32s(&double.rhs[1])];
-            let row = |row: &Row<f64>| Row {
-                a: row.a as f32,
-                b: row.b as f32,
-                d: row.d as f32,
-                e: row.e as f32,
-                weight: row.weight as f32,
+            let System { rows, rhs } = test_system(n, 10.0);
+            let row = |&Row { a, b, d, e, weight }: &Row<f64>| {
+                let [a, b, d, e, weight] = [a, b, d, e, weight].map(|number| number as f32);
+                Row { a, b, d, e, weight }
             };
-            let rows: Vec<Row<f32>> = double.rows.iter().map(row).collect();
-            let other = System { rows: rows.clone(), rhs: [y.clone(), x.clone()] };
-            let system = System { rows, rhs: [x, y] };
-            let solved = |system: &System<f32, 2>, factor: &mut Factor<f32, 2>| {
-                let mut u = [Ring::zeros(n), Ring::zeros(n)];
-                assert!(solve(system, u.each_mut(), factor));
-                u
-            };
-            let mut factor = Factor::new(n);
-            let first = solved(&system, &mut factor);
-            let rhs = other.rhs.each_ref().map(|rhs| Ring::from_nodes(rhs.iter().copied()));
-            let mut again = [Ring::zeros(n), Ring::zeros(n)];
-            assert!(solve_again(&rhs, again.each_mut(), &mut factor));
-            assert_eq!(again, solved(&other, &mut Factor::new(n)), "n = {n}");
-            assert_ne!(again, first);
+            let rhs = rhs.map(|rhs| rhs.into_iter().map(|number| number as f32).collect());
+            let system = System { rows: rows.iter().map(row).collect(), rhs };
+            let rings = || [Ring::zeros(n), Ring::zeros(n)];
+            let (mut first, mut factor) = (rings(), Factor::new(n));
+            assert!(solve(&system, first.each_mut(), &mut factor));
+            let (mut lacks, mut expected) = (rings(), rings());
+            assert!(refine(&system, first.each_ref(), lacks.each_mut(), &mut factor));
+            let remaining = Remaining { of: &system, unknown: first.each_ref() };
+            assert!(solve(&remaining, expected.each_mut(), &mut Factor::new(n)));
+            assert_eq!(lacks, expected, "n = {n}");
+            assert!(lacks[0].nodes().iter().any(|lack| *lack != 0.0) && lacks != first);
         }
     }
 }

@@ -127,13 +127,12 @@ pub trait Solves: 'static {
         live: N::Mask,
     ) -> Swept<N>;
 
-    /// Makes one round of a [refinement](refinement::solve), in short numbers: solves for `lacks`, whose values do not
-    /// matter, `system` with the right-hand sides `left`. Earlier solves of it and rounds have made `made` sweeps.
-    /// Converged are the lanes that may continue.
+    /// Makes one round of a [refinement](refinement::solve), in short numbers: solves for what `unknown` lacks; values
+    /// of `lacks` do not matter. Earlier rounds have made `made` sweeps. Converged are the lanes that may continue.
     #[expect(clippy::too_many_arguments)]
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
-        left: &[Ring<N>; F],
+        unknown: [&Ring<N>; F],
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         blocks: Blocks,
@@ -230,7 +229,7 @@ impl Solves for Sweeps {
     #[inline(always)]
     fn round<N: Number, const F: usize>(
         system: &impl Equations<N, F>,
-        left: &[Ring<N>; F],
+        unknown: [&Ring<N>; F],
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         blocks: Blocks,
@@ -238,7 +237,7 @@ impl Solves for Sweeps {
         made: N,
         live: N::Mask,
     ) -> Swept<N> {
-        memory.system.assemble(&refinement::Remaining { of: system, left });
+        memory.system.assemble(&refinement::Remaining { of: system, unknown });
         gauss_seidel::sweep_round(&memory.system, lacks, blocks, control, made, live)
     }
 }
@@ -275,8 +274,8 @@ impl Solves for Elimination {
 
     #[inline(always)]
     fn round<N: Number, const F: usize>(
-        _: &impl Equations<N, F>,
-        left: &[Ring<N>; F],
+        system: &impl Equations<N, F>,
+        unknown: [&Ring<N>; F],
         lacks: [&mut Ring<N>; F],
         memory: &mut Memory<N, F>,
         _: Blocks,
@@ -284,6 +283,6 @@ impl Solves for Elimination {
         _: N,
         _: N::Mask,
     ) -> Swept<N> {
-        Swept::without_sweeps(direct::solve_again(left, lacks, &mut memory.factor))
+        Swept::without_sweeps(direct::refine(system, unknown, lacks, &mut memory.factor))
     }
 }

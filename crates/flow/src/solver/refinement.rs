@@ -15,27 +15,12 @@ use crate::number::{BIG, Mask, Number};
 /// seen.
 pub const SETTLED: f64 = 8.0;
 
-/// What a solution leaves of the right-hand sides, and what it lacks.
-#[derive(Clone, Debug)]
-pub struct Remainder<N, const F: usize> {
-    left: [Ring<N>; F],
-    lacks: [Ring<N>; F],
-}
-
-impl<N: Number, const F: usize> Remainder<N, F> {
-    /// Allocates room for systems of `n` equations.
-    pub fn zeros(n: usize) -> Self {
-        let rings = || std::array::from_fn(|_| Ring::zeros(n));
-        Remainder { left: rings(), lacks: rings() }
-    }
-}
-
 /// The equations for what a solution lacks.
 pub struct Remaining<'a, N, E, const F: usize> {
     /// The equations.
     pub of: &'a E,
-    /// What the solution leaves of their right-hand sides.
-    pub left: &'a [Ring<N>; F],
+    /// The solution.
+    pub unknown: [&'a Ring<N>; F],
 }
 
 impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remaining<'_, N, E, F> {
@@ -43,7 +28,7 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     fn equation(&self, i: usize) -> Equation<N, F> {
         let mut own = self.of.equation(i);
         for f in 0..F {
-            own.rhs[f] = self.left[f][i];
+            own.rhs[f] = own.rhs[f] - self.of.applied(i, self.unknown[f]);
         }
         own
     }
@@ -54,13 +39,14 @@ impl<N: Number, E: Equations<N, F>, const F: usize> Equations<N, F> for Remainin
     }
 }
 
-/// Solves `equations`, and refines the solution if `control` says so. Sweeps start from `unknown`.
+/// Solves `equations`, and refines the solution if `control` says so; `lacks` is room for what it lacks. Sweeps start
+/// from `unknown`.
 #[inline(always)]
 pub fn solve<N: Number, S: Solves, const F: usize>(
     equations: &impl Equations<N, F>,
     mut unknown: [&mut Ring<N>; F],
     memory: &mut Memory<N, F>,
-    remainder: &mut Remainder<N, F>,
+    lacks: &mut [Ring<N>; F],
     blocks: Blocks,
     control: &Control<N>,
     mut live: N::Mask,
@@ -68,7 +54,6 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
     if !N::IS_SHORT || (S::FACTS.sweeps && !control.refined) {
         return S::solve(equations, unknown, memory, blocks, control, live);
     }
-    let Remainder { left, lacks } = remainder;
     let mut all = Swept { sweeps: N::of(0.0), converged: live, finite: live };
     let mut made = 0;
     if !S::FACTS.sweeps {
@@ -77,13 +62,8 @@ pub fn solve<N: Number, S: Solves, const F: usize>(
         made = 1;
     }
     while live.any() {
-        for i in 0..blocks.n {
-            let rhs = equations.equation(i).rhs;
-            for f in 0..F {
-                left[f][i] = rhs[f] - equations.applied(i, unknown[f]);
-            }
-        }
-        let swept = S::round(equations, left, lacks.each_mut(), memory, blocks, control, all.sweeps, live);
+        let now = unknown.each_ref().map(|ring| &**ring);
+        let swept = S::round(equations, now, lacks.each_mut(), memory, blocks, control, all.sweeps, live);
         all.sweeps += swept.sweeps;
         all.converged = all.converged.and(swept.converged.or(live.not()));
         all.finite = all.finite.and(swept.finite.or(live.not()));

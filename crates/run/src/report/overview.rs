@@ -104,9 +104,14 @@ impl Overview<'_> {
     }
 
     fn relaxation(&self) -> String {
-        let unit = unit(self.spec);
-        self.only_cell()
-            .map_or(String::new(), |cell| unit + &times(self.statistics.times(cell), self.limits_of(cell), "relaxed"))
+        // Which the table of statuses counts as vanished.
+        let later = match self.tally.relaxed_before_vanishing() {
+            0 => String::new(),
+            count => format!("; {count} vanished afterwards"),
+        };
+        let line =
+            |cell| unit(self.spec) + &times(self.statistics.times(cell), self.limits_of(cell), "relaxed") + &later;
+        self.only_cell().map_or(String::new(), line)
     }
 
     /// The times of a cell of which limits are shown, if they are.
