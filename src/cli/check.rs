@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{flags, note, print, print_json};
 use crate::{
     backend::gpu::{Gpu, kernel::Budget},
-    conformance::{ConformanceRow, adaptive, compare::MEMBERS, events, runs, stages},
+    conformance::{ConformanceRow, Driven, compare::MEMBERS, events, runs, stages},
     error::{Error, Result},
     placement::no_adapter,
     report::progress::Progress,
@@ -196,18 +196,18 @@ fn compare_kernel<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize, kind: Compare
     let mut rows = Vec::new();
     match kind {
         Compared::Stages => {
-            rows = stages::<T>(gpu, solver, n, None)?;
+            rows = stages::<T>(Driven::Paper, gpu, solver, n, |_| ())?;
             rows.retain(|row| solver == Solver::ALL[0] || row.quantity.starts_with('δ'));
         }
         Compared::Fixed => {
             for steps in STEPS {
-                rows.extend(runs::<T>(gpu, solver, n, steps, BUDGET, None)?);
+                rows.extend(runs::<T>(Driven::Paper, gpu, solver, n, Some(steps), BUDGET, |_| ())?);
             }
         }
-        Compared::Adaptive => rows = adaptive::<T>(gpu, solver, n, BUDGET, None)?,
+        Compared::Adaptive => rows = runs::<T>(Driven::Paper, gpu, solver, n, None, BUDGET, |_| ())?,
         Compared::Events | Compared::AdaptiveEvents => {
             let adaptive = matches!(kind, Compared::AdaptiveEvents);
-            rows.push(events::<T>(gpu, solver, n, adaptive, BUDGET, None)?);
+            rows.push(events::<T>(gpu, solver, n, adaptive, BUDGET, |_| ())?);
         }
     }
     Ok(rows)

@@ -5,7 +5,7 @@ use curvelax::{
     conformance::{
         ConformanceRow, Driven, adaptive_members,
         compare::{MAX_SWEEPS, MEMBERS, on_gpu},
-        driven, self_test, stages_of,
+        runs, self_test, stages,
     },
     ensemble::request::spec::Precision,
     flow::{DIFFUSIVITY_WAVES, ENERGY_WAVES},
@@ -37,10 +37,10 @@ pub(super) fn geometric_agrees<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) 
 /// `other`. In f32 only after few adaptive steps: x counts in their errors, which are then next to rounding, and of
 /// forty steps one side makes another number.
 fn driven_agree<T: Evolves>([as_driven, other]: [Driven; 2], gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    check(&stages_of::<T>(as_driven, gpu, solver, n, None)?)?;
+    check(&stages::<T>(as_driven, gpu, solver, n, |_| ())?)?;
     let many = (T::PRECISION == Precision::F64).then_some(None);
     for steps in [Some(1), Some(100)].into_iter().chain(many) {
-        check(&driven::<T>(as_driven, gpu, solver, n, steps, dispatches_of(7), None)?)?;
+        check(&runs::<T>(as_driven, gpu, solver, n, steps, dispatches_of(7), |_| ())?)?;
     }
     let (blocks, method) = (Blocks::new(n).ok_or("n")?, Method::coloured(solver, MAX_SWEEPS));
     for adaptive in [false, true] {
@@ -97,7 +97,8 @@ pub(super) fn another_force_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usiz
         ("set of what is kept", |run| run.parameters.law[CONSERVED] = 3.0 - run.parameters.law[CONSERVED]),
     ];
     for (what, change) in changes {
-        match driven::<T>(Driven::Forced, gpu, solver, n, Some(1), dispatches_of(7), Some(change)) {
+        let change_all = |runs: &mut [Run<f64>]| runs.iter_mut().for_each(change);
+        match runs::<T>(Driven::Forced, gpu, solver, n, Some(1), dispatches_of(7), change_all) {
             Ok(rows) if rows.iter().all(ConformanceRow::passes) => {
                 return Err(format!("another {what} was not noticed").into());
             }
@@ -122,7 +123,8 @@ pub(super) fn another_crystal_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: us
         ],
     };
     for (what, change) in ["energy", "mobility"].into_iter().zip(changes) {
-        match driven::<T>(Driven::Crystals, gpu, solver, n, Some(1), dispatches_of(7), Some(change)) {
+        let change_all = |runs: &mut [Run<f64>]| runs.iter_mut().for_each(change);
+        match runs::<T>(Driven::Crystals, gpu, solver, n, Some(1), dispatches_of(7), change_all) {
             Ok(rows) if rows.iter().all(ConformanceRow::passes) => {
                 return Err(format!("another {what} was not noticed").into());
             }

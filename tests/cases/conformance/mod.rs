@@ -18,8 +18,8 @@ use curvelax::scheme::evolve::Evolves;
 use curvelax::{
     backend::gpu::{Gpu, Kernel, Variant, kernel::Budget},
     conformance::{
-        ConformanceRow, Tamper, adaptive_members,
-        compare::{Left, adaptive, events, on_gpu, on_gpu_by, runs, stages},
+        ConformanceRow, Driven, Tamper, adaptive_members,
+        compare::{Left, events, on_gpu, on_gpu_by, runs, stages},
         members,
     },
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
@@ -223,16 +223,16 @@ fn line(row: &ConformanceRow) -> String {
 }
 
 fn stages_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    check(&stages::<T>(gpu, solver, n, None)?)
+    check(&stages::<T>(Driven::Paper, gpu, solver, n, |_| ())?)
 }
 
 fn runs_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    check(&runs::<T>(gpu, solver, n, 1, dispatches_of(1), None)?)?;
-    check(&runs::<T>(gpu, solver, n, 100, dispatches_of(7), None)?)
+    check(&runs::<T>(Driven::Paper, gpu, solver, n, Some(1), dispatches_of(1), |_| ())?)?;
+    check(&runs::<T>(Driven::Paper, gpu, solver, n, Some(100), dispatches_of(7), |_| ())?)
 }
 
 fn adaptive_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
-    let rows = adaptive::<T>(gpu, solver, n, dispatches_of(7), None)?;
+    let rows = runs::<T>(Driven::Paper, gpu, solver, n, None, dispatches_of(7), |_| ())?;
     if rows.iter().any(|row| row.steps < 5) {
         return Err("too few steps to compare".into());
     }
@@ -241,7 +241,7 @@ fn adaptive_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
 
 fn events_agree<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     for adaptive in [false, true] {
-        check(&[events::<T>(gpu, solver, n, adaptive, dispatches_of(7), None)?])?;
+        check(&[events::<T>(gpu, solver, n, adaptive, dispatches_of(7), |_| ())?])?;
     }
     Ok(())
 }
@@ -252,7 +252,7 @@ fn a_moved_node_fails_events<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) ->
     for adaptive in paces {
         // This one watches its length, which moves with a node.
         let tamper = Tamper { member: 8, node: n / 2, by: 1e9 * T::EPSILON.min(1e-10) };
-        let row = events::<T>(gpu, solver, n, *adaptive, dispatches_of(7), Some(tamper))?;
+        let row = events::<T>(gpu, solver, n, *adaptive, dispatches_of(7), |runs| tamper.apply(runs))?;
         if row.passes() || row.at.0 != tamper.member {
             return Err(format!("a moved node was not noticed: {}", line(&row)).into());
         }
@@ -265,7 +265,7 @@ fn a_moved_node_fails_adaptive<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) 
     let by = if gpu.is_hardware() { 4.0 } else { 1.0 } * 65536.0 * T::EPSILON;
     let tamper = Tamper { member: 4, node: n / 2, by };
     // Either a row fails, or the member makes other steps.
-    match adaptive::<T>(gpu, solver, n, dispatches_of(7), Some(tamper)) {
+    match runs::<T>(Driven::Paper, gpu, solver, n, None, dispatches_of(7), |runs| tamper.apply(runs)) {
         Ok(rows) if rows.iter().all(ConformanceRow::passes) => Err("a moved node was not noticed".into()),
         Ok(rows) => match rows.iter().find(|row| !row.passes() && row.at.0 != tamper.member) {
             Some(row) => Err(format!("the wrong member was named: {}", line(row)).into()),
@@ -332,8 +332,8 @@ fn adaptive_bad_members<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outc
 /// The negative control: a displacement far below anything visible must fail, and the row must name the member.
 fn a_moved_node_fails<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let tamper = Tamper { member: 4, node: n / 2, by: 4096.0 * T::EPSILON };
-    let after_step = stages::<T>(gpu, solver, n, Some(tamper))?;
-    let after_run = runs::<T>(gpu, solver, n, 1, dispatches_of(1), Some(tamper))?;
+    let after_step = stages::<T>(Driven::Paper, gpu, solver, n, |runs| tamper.apply(runs))?;
+    let after_run = runs::<T>(Driven::Paper, gpu, solver, n, Some(1), dispatches_of(1), |runs| tamper.apply(runs))?;
     for rows in [after_step, after_run] {
         let caught: Vec<&ConformanceRow> = rows.iter().filter(|row| !row.passes()).collect();
         if caught.is_empty() {

@@ -4,8 +4,8 @@
 //! fuses or reassociates: by a few roundings of each quantity's natural scale. A bound is `k · ε · scale`; the
 //! factors are in one table ([`bounds`]), with the reason for each scale.
 //!
-//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps, [`adaptive`]
-//! after adaptive ones, [`events`] where members pause at levels. They use an ensemble in which every member has its
+//! *Practice.* [`stages`] compares everything that one step computes, [`runs`] the curve after many steps, fixed or
+//! adaptive ones, [`events`] where members pause at levels. They use an ensemble in which every member has its
 //! own curve, flow, τ and ω ([`members`]). `curvelax check` prints the table; `tests/cases/conformance` asserts it,
 //! with a negative control for each comparison. A run that begins on a GPU compares a few members first
 //! ([`self_test`](self_test::self_test)).
@@ -17,5 +17,5 @@ pub mod self_test;
 pub use curvelax_backend::bounds;
 
 pub use cases::{Driven, adaptive_members, members};
-pub use compare::{ConformanceRow, Tamper, adaptive, driven, events, runs, stages, stages_of};
+pub use compare::{ConformanceRow, Tamper, events, runs, stages};
 pub use self_test::self_test;

@@ -6,7 +6,7 @@
 use super::{
     adaptive_members,
     cases::{Driven, LAWS},
-    compare::{ConformanceRow, Left, compare_ends},
+    compare::{ConformanceRow, compare_ends, to_their_goals},
     members,
 };
 use curvelax_backend::Backend;
@@ -58,17 +58,8 @@ pub fn self_test<T: Evolves>(
     }
     // In all batches.
     let slots: Vec<usize> = (0..count).map(|member| member * backend.slots() / count).collect();
-    for (slot, launch) in slots.iter().zip(&launches) {
-        backend.load(*slot, launch)?;
-    }
-    while slots.iter().any(|slot| backend.counters(*slot).is_running()) {
-        backend.advance()?;
-    }
-    let mut left = Vec::with_capacity(count);
-    for slot in slots {
-        left.push(Left { state: backend.state(slot)?, counters: backend.counters(slot), report: backend.report(slot) });
-        backend.clear(slot);
-    }
+    let left = to_their_goals(backend, &slots, &launches)?;
+    slots.into_iter().for_each(|slot| backend.clear(slot));
     let wrong = |what: String| {
         let remedy = "see `curvelax check`, or use --backend cpu";
         Error::Device(format!("GPU {device} computes wrongly: {what}; {remedy}"))

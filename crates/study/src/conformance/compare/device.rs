@@ -53,14 +53,24 @@ pub fn on_gpu_by<T: Evolves>(
     budget: Budget,
 ) -> Result<Vec<Left>> {
     let kernel = gpu::Kernel::<T>::new(adapter, blocks(n)?, launches.len(), MAX_SWEEPS, variant)?;
-    let mut kernel = kernel.with_budget(budget);
-    for (slot, launch) in launches.iter().enumerate() {
-        kernel.load(slot, launch)?;
+    let slots: Vec<usize> = (0..launches.len()).collect();
+    to_their_goals(&mut kernel.with_budget(budget), &slots, launches)
+}
+
+/// Runs `launches` to their goals in these slots of a back end, where they stay.
+pub(in crate::conformance) fn to_their_goals(
+    backend: &mut dyn Backend,
+    slots: &[usize],
+    launches: &[Run<f64>],
+) -> Result<Vec<Left>> {
+    for (slot, launch) in slots.iter().zip(launches) {
+        backend.load(*slot, launch)?;
     }
-    while (0..launches.len()).any(|slot| kernel.counters(slot).is_running()) {
-        kernel.advance()?;
+    while slots.iter().any(|slot| backend.counters(*slot).is_running()) {
+        backend.advance()?;
     }
-    let left =
-        |slot| Ok(Left { state: kernel.state(slot)?, counters: kernel.counters(slot), report: kernel.report(slot) });
-    (0..launches.len()).map(left).collect()
+    let left = |slot: &usize| {
+        Ok(Left { state: backend.state(*slot)?, counters: backend.counters(*slot), report: backend.report(*slot) })
+    };
+    slots.iter().map(left).collect()
 }

@@ -4,7 +4,7 @@ use super::{
     device::{Left, on_gpu},
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
-    setup::{Tamper, method, tampered},
+    setup::method,
     twin::{twin, without_ties},
 };
 use crate::conformance::{
@@ -14,6 +14,7 @@ use crate::conformance::{
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::{
+    number::Real,
     scheme::{
         Curve, dense, extrapolation,
         member::{Counters, Decay, NEVER, Progress, Report},
@@ -31,85 +32,45 @@ pub(super) const ADAPTIVE: f64 = 1e-3;
 /// Fixed steps of a member that take as long as its adaptive run in the comparison.
 pub const ADAPTIVE_STEPS: u32 = 40;
 
-/// Compares the curves after `steps` steps, in dispatches of `budget`.
-pub fn runs<T: Evolves>(
-    adapter: &gpu::Gpu,
-    solver: Solver,
-    n: usize,
-    steps: u32,
-    budget: Budget,
-    tamper: Option<Tamper>,
-) -> Result<Vec<ConformanceRow>> {
-    let launches = members(n, MEMBERS, steps)?;
-    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
-}
-
-/// Compares the curves after adaptive steps to the same time, in dispatches of `budget`.
-///
-/// Rounding changes a step length by its change of the error estimate, relative to the tolerance; a changed length
-/// changes the curve by the tolerance times that. So rounding changes the curve no more than with fixed steps of the
-/// longest length taken, five of them per step, and the bounds are the same. Bounds of quantities inside the run are in
-/// [`PACE`].
-pub fn adaptive<T: Evolves>(
-    adapter: &gpu::Gpu,
-    solver: Solver,
-    n: usize,
-    budget: Budget,
-    tamper: Option<Tamper>,
-) -> Result<Vec<ConformanceRow>> {
-    let launches = adaptive_launches::<T>(solver, n, |_| ())?;
-    ends_agree::<T>(adapter, solver, n, launches, budget, tamper)
-}
-
-/// Members of adaptive steps, changed so.
-pub(super) fn adaptive_launches<T: Evolves>(
-    solver: Solver,
-    n: usize,
-    change: impl Fn(&mut [Run<f64>]),
-) -> Result<Vec<Run<f64>>> {
-    let mut launches = adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?;
-    change(&mut launches);
-    launches.into_iter().map(|launch| without_ties::<T>(launch, &method(solver), n)).collect()
-}
-
 /// Compares members driven so after so many fixed steps, or adaptive ones to the same time, in dispatches of `budget`.
-/// Those on the GPU are changed, if a change is given; the comparison must then fail.
-pub fn driven<T: Evolves>(
+/// Those on the GPU are changed by `tamper`; if that does anything, the comparison must fail.
+///
+/// Rounding changes the length of an adaptive step by its change of the error estimate, relative to the tolerance; a
+/// changed length changes the curve by the tolerance times that. So rounding changes the curve no more than with fixed
+/// steps of the longest length taken, five of them per step, and the bounds are the same. Bounds of quantities inside
+/// the run are in [`PACE`].
+pub fn runs<T: Evolves>(
     driven: Driven,
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
     steps: Option<u32>,
     budget: Budget,
-    change: Option<fn(&mut Run<f64>)>,
+    tamper: impl FnOnce(&mut [Run<f64>]),
 ) -> Result<Vec<ConformanceRow>> {
-    let launches = match steps {
-        Some(steps) => {
-            let mut launches = members(n, MEMBERS, steps)?;
-            driven.change(&mut launches);
-            launches
-        }
-        None => adaptive_launches::<T>(solver, n, |launches| driven.change(launches))?,
-    };
-    let mut changed = launches.clone();
-    if let Some(change) = change {
-        changed.iter_mut().for_each(change);
-    }
-    let ours = on_gpu::<T>(adapter, solver, n, &changed, budget)?;
+    let launches = launches::<T>(driven, solver, n, steps)?;
+    let mut tampered = launches.clone();
+    tamper(&mut tampered);
+    let ours = on_gpu::<T>(adapter, solver, n, &tampered, budget)?;
     compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
 }
 
-/// Compares both sides of `launches` at their ends.
-fn ends_agree<T: Evolves>(
-    adapter: &gpu::Gpu,
+/// Members driven so, of so many fixed steps, or of adaptive ones to the time of [`ADAPTIVE_STEPS`].
+pub(super) fn launches<T: Evolves>(
+    driven: Driven,
     solver: Solver,
     n: usize,
-    launches: Vec<Run<f64>>,
-    budget: Budget,
-    tamper: Option<Tamper>,
-) -> Result<Vec<ConformanceRow>> {
-    let ours = on_gpu::<T>(adapter, solver, n, &tampered(launches.clone(), tamper), budget)?;
-    compare_ends::<T>(adapter.is_hardware(), &method(solver), n, &launches, &ours)
+    steps: Option<u32>,
+) -> Result<Vec<Run<f64>>> {
+    let mut launches = match steps {
+        Some(steps) => members(n, MEMBERS, steps)?,
+        None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
+    };
+    driven.change(&mut launches);
+    match steps {
+        Some(_) => Ok(launches),
+        None => launches.into_iter().map(|launch| without_ties::<T>(launch, &method(solver), n)).collect(),
+    }
 }
 
 /// Compares a device's results of `launches` with those of the twin by `method`, within the bounds for hardware or
@@ -136,9 +97,7 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         let mut at = launch.clone();
         at.parameters.tau = at.parameters.tau.max(twin.longest);
         let scales = Scales::of(&at)?;
-        let grown = growth(twin.left.counters.steps);
-        let amplified = if adaptive { extrapolation::roundings::<T>(twin.order) } else { 1.0 };
-        let roundings = grown * amplified;
+        let roundings = roundings::<T>(twin.left.counters.steps, twin.order, adaptive);
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
@@ -158,6 +117,11 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         }
     }
     Ok(rows)
+}
+
+/// By how much rounding grows in so many steps.
+pub(super) fn roundings<T: Real>(steps: u32, order: u32, adaptive: bool) -> f64 {
+    growth(steps) * if adaptive { extrapolation::roundings::<T>(order) } else { 1.0 }
 }
 
 /// Checks that both sides ended alike, after equally many steps and with their events in the same ones; else returns

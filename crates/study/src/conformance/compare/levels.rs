@@ -2,21 +2,21 @@
 
 use super::{
     device::{Left, on_gpu},
-    ends::adaptive_launches,
+    ends::{launches, roundings},
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
-    setup::{Tamper, method, tampered},
+    setup::method,
     twin::{Twin, twin},
 };
 use crate::conformance::{
-    bounds::{Bound, EVENT, REPORT, growth},
-    cases::{MEMBERS, members},
+    bounds::{Bound, EVENT, REPORT},
+    cases::Driven,
 };
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::{
-    number::{BIG, Real},
-    scheme::{extrapolation, member::Observed, run::Run, step::Method},
+    number::BIG,
+    scheme::{member::Observed, run::Run, step::Method},
     solver::Solver,
 };
 use curvelax_gpu as gpu;
@@ -36,23 +36,21 @@ struct Watched {
 }
 
 /// Compares the times at which watched observables reach their levels, within 100 fixed steps or adaptive ones over the
-/// time of [`ADAPTIVE_STEPS`](super::ADAPTIVE_STEPS), in dispatches of `budget`.
+/// time of [`ADAPTIVE_STEPS`](super::ADAPTIVE_STEPS), in dispatches of `budget`; `tamper` as in [`runs`](super::runs).
 pub fn events<T: Evolves>(
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
     adaptive: bool,
     budget: Budget,
-    tamper: Option<Tamper>,
+    tamper: impl FnOnce(&mut [Run<f64>]),
 ) -> Result<ConformanceRow> {
-    let launches = match adaptive {
-        false => members(n, MEMBERS, STEPS)?,
-        true => adaptive_launches::<T>(solver, n, |_| ())?,
-    };
+    let launches = launches::<T>(Driven::Paper, solver, n, (!adaptive).then_some(STEPS))?;
     let method = method(solver);
     let watched = watched::<T>(&launches, &method, n)?;
-    let paused = watched.iter().map(|watched| watched.launch.clone()).collect();
-    let ours = on_gpu::<T>(adapter, solver, n, &tampered(paused, tamper), budget)?;
+    let mut paused: Vec<Run<f64>> = watched.iter().map(|watched| watched.launch.clone()).collect();
+    tamper(&mut paused);
+    let ours = on_gpu::<T>(adapter, solver, n, &paused, budget)?;
     agree::<T>(adapter.is_hardware(), &method, n, &watched, &ours)
 }
 
@@ -78,11 +76,6 @@ fn watched<T: Evolves>(launches: &[Run<f64>], method: &Method, n: usize) -> Resu
         Ok(Watched { launch, level })
     };
     launches.iter().enumerate().map(of).collect()
-}
-
-/// By how much rounding grows in so many steps.
-fn roundings<T: Real>(steps: u32, order: u32, adaptive: bool) -> f64 {
-    growth(steps) * if adaptive { extrapolation::roundings::<T>(order) } else { 1.0 }
 }
 
 /// Compares the times of the events, see [`EVENT`].

@@ -21,15 +21,15 @@ pub struct Tamper {
     pub by: f64,
 }
 
-pub(super) fn tampered(mut launches: Vec<Run<f64>>, tamper: Option<Tamper>) -> Vec<Run<f64>> {
-    if let Some(Tamper { member, node, by }) = tamper {
-        let curve = &mut launches[member].state.curve;
+impl Tamper {
+    /// Moves the node.
+    pub fn apply(self, launches: &mut [Run<f64>]) {
+        let curve = &mut launches[self.member].state.curve;
         for coordinate in [&mut curve.x, &mut curve.y] {
-            coordinate[node] *= 1.0 + by;
+            coordinate[self.node] *= 1.0 + self.by;
             coordinate.close();
         }
     }
-    launches
 }
 
 pub(super) fn method(solver: Solver) -> Method {

@@ -1,18 +1,16 @@
 //! Comparison of everything that one step computes, stage by stage.
 
 use super::{
+    device::to_their_goals,
     row::{ConformanceRow, OnCpu, OnGpu},
     scales::Scales,
-    setup::{MAX_SWEEPS, Tamper, blocks, method, tampered, traced_workspace},
+    setup::{MAX_SWEEPS, blocks, method, traced_workspace},
 };
 use crate::conformance::{
     bounds::STAGES,
     cases::{Driven, MEMBERS, members},
 };
-use curvelax_backend::{
-    Backend,
-    gpu::{Variant, shader::TRACE_FIELDS},
-};
+use curvelax_backend::gpu::{Variant, shader::TRACE_FIELDS};
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::{
@@ -21,23 +19,14 @@ use curvelax_flow::{
 };
 use curvelax_gpu as gpu;
 
-/// Compares everything that one step of the paper computes, stage by stage.
+/// Compares everything that one step of members driven so computes, stage by stage. Those on the GPU are changed by
+/// `tamper`; if that does anything, the comparison must fail.
 pub fn stages<T: Evolves>(
-    adapter: &gpu::Gpu,
-    solver: Solver,
-    n: usize,
-    tamper: Option<Tamper>,
-) -> Result<Vec<ConformanceRow>> {
-    stages_of::<T>(Driven::Paper, adapter, solver, n, tamper)
-}
-
-/// Compares everything that one step of members driven so computes.
-pub fn stages_of<T: Evolves>(
     driven: Driven,
     adapter: &gpu::Gpu,
     solver: Solver,
     n: usize,
-    tamper: Option<Tamper>,
+    tamper: impl FnOnce(&mut [Run<f64>]),
 ) -> Result<Vec<ConformanceRow>> {
     let mut launches = members(n, MEMBERS, 1)?;
     driven.change(&mut launches);
@@ -48,13 +37,10 @@ pub fn stages_of<T: Evolves>(
         MAX_SWEEPS,
         Variant { traced: true, ..driven.variant(adapter.capacity().variant(blocks(n)?, solver)) },
     )?;
-    for (slot, launch) in tampered(launches.clone(), tamper).iter().enumerate() {
-        kernel.load(slot, launch)?;
-    }
     kernel.poison_trace()?;
-    while (0..MEMBERS).any(|slot| kernel.counters(slot).is_running()) {
-        kernel.advance()?;
-    }
+    let mut tampered = launches.clone();
+    tamper(&mut tampered);
+    to_their_goals(&mut kernel, &(0..MEMBERS).collect::<Vec<_>>(), &tampered)?;
     let trace = kernel.trace()?;
     let mut rows: Vec<ConformanceRow> =
         STAGES.iter().map(|bound| ConformanceRow::begin::<T>(bound, solver, n, 1)).collect();
