@@ -79,7 +79,7 @@ impl Bench {
     /// [`Error::Request`] if the back end does not support the spec, [`Error::Device`] if it fails, [`Error::Failed`]
     /// if a member does.
     pub fn open(spec: &Spec, window: Duration) -> Result<Bench> {
-        let choice = placement::choose(spec, spec.points)?;
+        let choice = placement::choose(spec)?;
         let precision = choice.precision();
         let family = Family::new(spec)?;
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);
@@ -91,7 +91,7 @@ impl Bench {
         };
         let members = (0..count.min(MEMBERS)).map(member).collect::<Result<Vec<_>>>()?;
         let started = Instant::now();
-        let (backend, platform) = choice.open(spec, spec.points)?;
+        let (backend, platform) = choice.open(spec)?;
         let made = vec![0; count.min(backend.slots())];
         let threads = HostThreads::new(spec.threads.unwrap_or(0));
         let mut bench = Bench { backend, platform, members, threads, made, stride: 1, start_up: Duration::ZERO };

@@ -65,7 +65,7 @@ struct Auto {
 pub fn adapters(args: AdaptersArgs) -> Result<()> {
     let spec = Spec::default();
     let adapters: Vec<Adapter> = Gpu::list().iter().map(|gpu| Adapter::new(gpu, &spec)).collect();
-    let choice = placement::choose(&spec, spec.points)?;
+    let choice = placement::choose(&spec)?;
     let mut settled = spec.clone();
     choice.settle_place(&mut settled);
     let Spec { backend, adapter, precision, .. } = settled;

@@ -118,7 +118,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     let (refereed, one) = (args.referee.is_given(), args.referee.is_one());
     let spec = if refereed { args.referee.spec(spec) } else { spec };
     let mut method = if refereed { checked(spec)? } else { spec.validate()? };
-    let choice = placement::choose(&method, method.points)?;
+    let choice = placement::choose(&method)?;
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle_place(&mut method);
     method.solver = method.solver().into();

@@ -158,7 +158,7 @@ fn line(row: &RefereeRow) -> String {
     let truth = row.truth.as_ref().ok();
     cells([
         &row.member.to_string(),
-        row.time.name(),
+        row.time,
         &row.points.to_string(),
         &known(row.t.map(|t| significant(t, 8))),
         &known(row.t_error.map(|error| format!("{error:.1e}"))),
@@ -173,14 +173,14 @@ fn line(row: &RefereeRow) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::truth::{RefereedTime, Truth};
+    use crate::truth::Truth;
 
     #[test]
     fn a_line_has_the_error_in_bars_and_dashes_where_nothing_is_known() {
         let truth = Truth { t: 2.0, error: 1e-9, ..Truth::default() };
         let row = RefereeRow {
             member: 7,
-            time: RefereedTime::Limit,
+            time: "t_limit",
             points: 100,
             t: Some(2.003),
             t_error: Some(0.002),

@@ -42,9 +42,9 @@ impl Sink for Last {
 fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) -> (Outcome, Vec<DVec2>) {
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, BaseCurve::from_formula(curve)).unwrap();
-    let choice = placement::choose(&spec, spec.points).unwrap();
+    let choice = placement::choose(&spec).unwrap();
     let precision = choice.precision();
-    let (mut backend, _) = choice.open(&spec, spec.points).unwrap();
+    let (mut backend, _) = choice.open(&spec).unwrap();
     let mut last = Last(None);
     simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut last).unwrap();
     let ended = last.0.unwrap();

@@ -65,7 +65,7 @@ impl TruthRow {
         let truth = row.truth.as_ref().ok();
         TruthRow {
             member: row.member,
-            time: row.time.name().to_string(),
+            time: row.time.to_string(),
             points: row.points as u64,
             t: row.t,
             t_error: row.t_error,

@@ -154,9 +154,9 @@ impl Figure {
     /// [`Error::Failed`] if the curve does not reach the last time.
     pub fn simulate(&self, spec: &Spec, progress: Progress) -> Result<Ended> {
         let family = Family::new(spec)?;
-        let choice = placement::choose(spec, family.points())?;
+        let choice = placement::choose(spec)?;
         let precision = choice.precision();
-        let (mut backend, _) = choice.open(spec, family.points())?;
+        let (mut backend, _) = choice.open(spec)?;
         let mut only = Only { ended: None, progress };
         simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut only)?;
         only.progress.finish();

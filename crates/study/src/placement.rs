@@ -66,6 +66,7 @@ impl Platform {
 }
 
 /// A back end that suits a spec, not yet opened.
+#[derive(Clone)]
 pub struct ChosenBackend {
     device: Device,
     /// Its number, if it was requested by number.
@@ -76,19 +77,19 @@ pub struct ChosenBackend {
     reason: String,
 }
 
-/// Chooses the back end for members of `n` nodes.
+/// Chooses the back end for the members of a spec.
 ///
 /// # Errors
 /// [`Error::Request`] if the adapter, the precision or n is not available.
-pub fn choose(spec: &Spec, n: usize) -> Result<ChosenBackend> {
+pub fn choose(spec: &Spec) -> Result<ChosenBackend> {
     match spec.backend {
-        BackendChoice::Cpu => cpu(spec, n, "asked for".into()),
-        BackendChoice::Gpu => gpu(spec, n),
-        BackendChoice::Auto if spec.adapter.is_some() => gpu(spec, n),
+        BackendChoice::Cpu => cpu(spec, "asked for".into()),
+        BackendChoice::Gpu => gpu(spec),
+        BackendChoice::Auto if spec.adapter.is_some() => gpu(spec),
         // Drivers are loaded only if needed: loading takes a tenth of a second, and Mesa's print messages that only
         // matter to windows.
-        BackendChoice::Auto if !may_have_hardware() => auto(spec, n, Vec::new()),
-        BackendChoice::Auto => auto(spec, n, Gpu::list()),
+        BackendChoice::Auto if !may_have_hardware() => auto(spec, Vec::new()),
+        BackendChoice::Auto => auto(spec, Gpu::list()),
     }
 }
 
@@ -101,24 +102,24 @@ pub fn choose(spec: &Spec, n: usize) -> Result<ChosenBackend> {
 pub fn choose_all(study: &Study) -> Result<Vec<ChosenBackend>> {
     let (stages, own) = (study.stages(), study.own_stage());
     let specs: Vec<Spec> = stages.iter().map(|stage| study.spec_of(stage)).collect::<Result<_>>()?;
-    let choice = choose(&specs[own], specs[own].points)?;
+    let choice = choose(&specs[own])?;
     let there = |(stage, spec): (&Stage, &Spec)| {
         if stage.level.is_some() && study.has_pilot() {
-            return cpu(spec, spec.points, "a pilot does not fill a GPU".into());
+            return cpu(spec, "a pilot does not fill a GPU".into());
         }
         if stage.is_selective() {
-            return choice.with_nodes(spec, spec.points);
+            return choice.with_nodes(spec);
         }
         let mut spec = spec.clone();
         choice.settle_place(&mut spec);
-        choose(&spec, spec.points)
+        choose(&spec)
     };
     let others: Result<Vec<ChosenBackend>> =
         stages.iter().zip(&specs).enumerate().filter(|(i, _)| *i != own).map(|(_, of)| there(of)).collect();
     match others {
         Err(error) if choice.or_cpu => {
             let reason = format!("the GPU cannot do all cells: {error}");
-            specs.iter().map(|spec| cpu(spec, spec.points, reason.clone())).collect()
+            specs.iter().map(|spec| cpu(spec, reason.clone())).collect()
         }
         others => {
             let mut all = others?;
@@ -140,29 +141,29 @@ pub fn settle(study: &mut Study, choices: &[ChosenBackend]) {
 }
 
 /// The choice of `--backend auto`: the first hardware GPU that can do the run, else the CPU.
-fn auto(spec: &Spec, n: usize, adapters: Vec<Gpu>) -> Result<ChosenBackend> {
+fn auto(spec: &Spec, adapters: Vec<Gpu>) -> Result<ChosenBackend> {
     if spec.order == Order::Lexicographic {
-        return cpu(spec, n, "lexicographic sweeps run on the CPU".into());
+        return cpu(spec, "lexicographic sweeps run on the CPU".into());
     }
     let none = if LOADS_DRIVERS { "no hardware GPU found" } else { "a static program cannot load GPU drivers" };
     let mut reason = none.to_string();
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
         let name = adapter.name().to_string();
-        match take(spec, n, adapter, format!("hardware GPU {name}")) {
+        match take(spec, adapter, format!("hardware GPU {name}")) {
             Ok(choice) => return Ok(choice.or_cpu()),
             Err(error) => reason = format!("GPU {name} cannot do it: {error}"),
         }
     }
-    cpu(spec, n, reason)
+    cpu(spec, reason)
 }
 
-fn cpu(spec: &Spec, n: usize, reason: String) -> Result<ChosenBackend> {
+fn cpu(spec: &Spec, reason: String) -> Result<ChosenBackend> {
     let precision = spec.precision.unwrap_or(Precision::F64);
-    check_precision(spec, n, precision)?;
+    check_precision(spec, precision)?;
     Ok(ChosenBackend { device: Device::Cpu, number: None, or_cpu: false, precision, reason })
 }
 
-fn gpu(spec: &Spec, n: usize) -> Result<ChosenBackend> {
+fn gpu(spec: &Spec) -> Result<ChosenBackend> {
     if spec.order == Order::Lexicographic {
         let message = "--adapter: lexicographic sweeps run on the CPU only; leave out --adapter";
         return Err(Error::Request(message.into()));
@@ -174,7 +175,7 @@ fn gpu(spec: &Spec, n: usize) -> Result<ChosenBackend> {
         false => {
             let adapter = chosen.swap_remove(0);
             let number = by_number.then(|| spec.adapter.clone()).flatten();
-            Ok(ChosenBackend { number, ..take(spec, n, adapter, "asked for".into())? })
+            Ok(ChosenBackend { number, ..take(spec, adapter, "asked for".into())? })
         }
         true => Err(no_adapter(spec.adapter.as_deref(), &names)),
     }
@@ -200,38 +201,36 @@ pub fn no_adapter(asked: Option<&str>, names: &[String]) -> Error {
     }
 }
 
-fn take(spec: &Spec, n: usize, adapter: Gpu, reason: String) -> Result<ChosenBackend> {
-    let precision = fitting_precision(spec, n, adapter.name(), &adapter.capacity())?;
+fn take(spec: &Spec, adapter: Gpu, reason: String) -> Result<ChosenBackend> {
+    let precision = fitting_precision(spec, adapter.name(), &adapter.capacity())?;
     Ok(ChosenBackend { device: Device::Gpu(Arc::new(adapter)), number: None, or_cpu: false, precision, reason })
 }
 
-/// The precision of the run on an adapter, if members of `n` nodes fit.
-fn fitting_precision(spec: &Spec, n: usize, name: &str, capacity: &Capacity) -> Result<Precision> {
+/// The precision of the run on an adapter, if its members fit.
+fn fitting_precision(spec: &Spec, name: &str, capacity: &Capacity) -> Result<Precision> {
     let precision = spec.precision.unwrap_or(capacity.best_precision());
     if precision == Precision::F64 && !capacity.f64 {
         let problem = format!("adapter {name} has no f64");
         return Err(Error::value("precision", "f64", &problem, "use --precision f32, or --backend cpu"));
     }
-    check_precision(spec, n, precision)?;
+    check_precision(spec, precision)?;
+    let (blocks, solver) = (ring(spec.points)?, spec.solver());
     let (fits, most) = match precision {
-        Precision::F32 => (
-            capacity.check_size::<f32>(ring(n)?, spec.solver()),
-            capacity.max_points::<f32>(spec.solver()).min(MAX_POINTS_F32),
-        ),
-        Precision::F64 => {
-            (capacity.check_size::<f64>(ring(n)?, spec.solver()), capacity.max_points::<f64>(spec.solver()))
+        Precision::F32 => {
+            (capacity.check_size::<f32>(blocks, solver), capacity.max_points::<f32>(solver).min(MAX_POINTS_F32))
         }
+        Precision::F64 => (capacity.check_size::<f64>(blocks, solver), capacity.max_points::<f64>(solver)),
     };
     fits.map_err(|needs| {
         let problem = format!("a member needs {needs}");
         let fewer = if most < MIN_POINTS { String::new() } else { format!("use {most} or fewer, or ") };
-        Error::value("points", n, &problem, &format!("{fewer}--backend cpu"))
+        Error::value("points", spec.points, &problem, &format!("{fewer}--backend cpu"))
     })?;
     Ok(precision)
 }
 
 /// f32 has a resolution limit: rounding grows like (1/h)⁴, and beyond the verified n results would only look right.
-fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
+fn check_precision(spec: &Spec, precision: Precision) -> Result<()> {
     // Levels beside fixed steps are solved directly.
     let by_sweeps = spec.adaptive.is_some() && spec.solver().sweeps();
     if precision == Precision::F32 && spec.refine && by_sweeps {
@@ -257,9 +256,9 @@ fn check_precision(spec: &Spec, n: usize, precision: Precision) -> Result<()> {
         let cpu = if spec.precision.is_some() { "" } else { ", or --backend cpu" };
         return Err(Error::value("precision", "f32", problem, &format!("use --precision f64{cpu}")));
     }
-    if precision == Precision::F32 && n > MAX_POINTS_F32 {
+    if precision == Precision::F32 && spec.points > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
-        return Err(Error::value("points", n, &problem, "use fewer points, or --precision f64"));
+        return Err(Error::value("points", spec.points, &problem, "use fewer points, or --precision f64"));
     }
     Ok(())
 }
@@ -345,22 +344,16 @@ impl ChosenBackend {
         }
     }
 
-    /// The same device for members of `n` nodes, or the CPU in f64 if it cannot hold them.
-    fn with_nodes(&self, spec: &Spec, n: usize) -> Result<ChosenBackend> {
+    /// The same device for members of another number of nodes, or the CPU in f64 if it cannot hold them.
+    fn with_nodes(&self, spec: &Spec) -> Result<ChosenBackend> {
         let same = Spec { precision: Some(self.precision), ..spec.clone() };
         let fits = match &self.device {
-            Device::Cpu => check_precision(&same, n, self.precision),
-            Device::Gpu(gpu) => fitting_precision(&same, n, gpu.name(), &gpu.capacity()).map(drop),
+            Device::Cpu => check_precision(&same, self.precision),
+            Device::Gpu(gpu) => fitting_precision(&same, gpu.name(), &gpu.capacity()).map(drop),
         };
         match fits {
-            Ok(()) => Ok(ChosenBackend {
-                device: self.device.clone(),
-                number: self.number.clone(),
-                or_cpu: self.or_cpu,
-                precision: self.precision,
-                reason: self.reason.clone(),
-            }),
-            Err(error) => cpu(&Spec { precision: None, ..spec.clone() }, n, error.to_string()),
+            Ok(()) => Ok(self.clone()),
+            Err(error) => cpu(&Spec { precision: None, ..spec.clone() }, error.to_string()),
         }
     }
 
@@ -404,33 +397,28 @@ impl ChosenBackend {
         (watch.tell)(&self.sentence(&cohort[0].spec));
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };
-        self.open_any(&whole, whole.points, watch)
+        self.open_any(&whole, watch)
     }
 
-    /// Opens the device for the members of `spec`, of `n` nodes; a GPU must pass a
+    /// Opens the device for the members of `spec`; a GPU must pass a
     /// [self-test](crate::conformance::self_test()). If `--backend auto` chose a GPU that fails or is not ready in two
     /// minutes, it opens the CPU, and the platform's reason says why.
     ///
     /// # Errors
     /// [`Error::Device`] if a requested GPU cannot be opened or computes wrongly.
-    pub fn open(&self, spec: &Spec, n: usize) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_any(spec, n, &OpeningWatch::default())
+    pub fn open(&self, spec: &Spec) -> Result<(Box<dyn Backend>, Platform)> {
+        self.open_any(spec, &OpeningWatch::default())
     }
 
-    fn open_any(&self, spec: &Spec, n: usize, watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
+    fn open_any(&self, spec: &Spec, watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
         match self.precision {
-            Precision::F32 => self.open_in::<f32>(spec, n, watch),
-            Precision::F64 => self.open_in::<f64>(spec, n, watch),
+            Precision::F32 => self.open_in::<f32>(spec, watch),
+            Precision::F64 => self.open_in::<f64>(spec, watch),
         }
     }
 
-    fn open_in<T: Vectorised>(
-        &self,
-        spec: &Spec,
-        n: usize,
-        watch: &OpeningWatch,
-    ) -> Result<(Box<dyn Backend>, Platform)> {
-        let blocks = ring(n)?;
+    fn open_in<T: Vectorised>(&self, spec: &Spec, watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
+        let blocks = ring(spec.points)?;
         let method = Method {
             solver: spec.solver(),
             order: spec.order,
@@ -448,7 +436,7 @@ impl ChosenBackend {
         match opened {
             Ok(backend) => Ok((backend, self.platform(spec))),
             Err(Error::Device(fault)) if self.or_cpu => {
-                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, n, watch)
+                self.on_cpu(format!("the GPU failed: {fault}")).open_in::<T>(spec, watch)
             }
             Err(error) => Err(error),
         }
@@ -508,8 +496,8 @@ mod tests {
     const LEAST: Capacity = Capacity::LEAST;
 
     fn refused(precision: Option<Precision>, n: usize, capacity: &Capacity) -> String {
-        let spec = Spec { precision, ..Spec::default() };
-        fitting_precision(&spec, n, "toaster", capacity).unwrap_err().to_string()
+        let spec = Spec { precision, points: n, ..Spec::default() };
+        fitting_precision(&spec, "toaster", capacity).unwrap_err().to_string()
     }
 
     #[test]
@@ -523,9 +511,9 @@ mod tests {
     #[test]
     fn a_run_that_asks_for_no_precision_gets_the_best_there_is() {
         let spec = Spec::default();
-        assert_eq!(fitting_precision(&spec, 100, "toaster", &LEAST).unwrap(), Precision::F32);
+        assert_eq!(fitting_precision(&spec, "toaster", &LEAST).unwrap(), Precision::F32);
         let with_f64 = Capacity { f64: true, ..LEAST };
-        assert_eq!(fitting_precision(&spec, 100, "toaster", &with_f64).unwrap(), Precision::F64);
+        assert_eq!(fitting_precision(&spec, "toaster", &with_f64).unwrap(), Precision::F64);
     }
 
     #[test]
@@ -534,7 +522,7 @@ mod tests {
         let spec = Spec { precision: Some(Precision::F64), ..Spec::default() };
         let most = capacity.max_points::<f64>(spec.solver());
         assert!(most >= 512, "{most}");
-        fitting_precision(&spec, most, "toaster", &capacity).unwrap();
+        fitting_precision(&Spec { points: most, ..spec }, "toaster", &capacity).unwrap();
         let message = refused(Some(Precision::F64), most + 1, &capacity);
         for part in [format!("--points {}", most + 1), format!("use {most} or fewer"), "--backend cpu".into()] {
             assert!(message.contains(&part), "{message}");
@@ -545,9 +533,10 @@ mod tests {
 
     #[test]
     fn f32_beyond_what_was_verified_is_refused_with_the_reason() {
-        let spec = Spec { precision: Some(Precision::F32), backend: BackendChoice::Cpu, ..Spec::default() };
-        choose(&spec, MAX_POINTS_F32).unwrap();
-        let message = choose(&spec, MAX_POINTS_F32 + 1).err().unwrap().to_string();
+        let spec =
+            |points| Spec { points, precision: Some(Precision::F32), backend: BackendChoice::Cpu, ..Spec::default() };
+        choose(&spec(MAX_POINTS_F32)).unwrap();
+        let message = choose(&spec(MAX_POINTS_F32 + 1)).err().unwrap().to_string();
         assert!(message.contains("verified against f64 up to"), "{message}");
     }
 }

@@ -340,8 +340,8 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
         ..Spec::default()
     };
     let spec = spec.validate()?;
-    let choice = placement::choose(&spec, spec.points)?;
-    let (mut backend, _) = choice.open(&spec, spec.points)?;
+    let choice = placement::choose(&spec)?;
+    let (mut backend, _) = choice.open(&spec)?;
     // The run has the cap that it asked for.
     let mut all = Vec::new();
     let cell = Cell::only(spec.clone(), Family::new(&spec)?);
@@ -356,17 +356,17 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     let spec = Spec { backend: BackendChoice::Gpu, adapter, curves: 3, t_end: Some(0.01.into()), ..Spec::default() }
         .validate()?;
     let choice = || -> Result<placement::ChosenBackend, Failed> {
-        let choice = placement::choose(&spec, spec.points)?;
+        let choice = placement::choose(&spec)?;
         let gpu = choice.device().gpu().ok_or("no GPU")?;
         let blocks = Blocks::new(spec.points).ok_or("n")?;
         let _ = gpu.pipeline::<f64>(blocks, gpu.capacity().variant(blocks, spec.solver()))?;
         gpu.lose();
         Ok(choice)
     };
-    named(choice()?.open(&spec, spec.points), gpu, "the device was lost")?;
+    named(choice()?.open(&spec), gpu, "the device was lost")?;
     let choice = choice()?.or_cpu();
     let precision = choice.precision();
-    let (mut backend, platform) = choice.open(&spec, spec.points)?;
+    let (mut backend, platform) = choice.open(&spec)?;
     let told = platform.reason.starts_with("the GPU failed: ") && platform.reason.contains("the device was lost");
     require(platform.backend == DeviceKind::Cpu && platform.adapter.is_none() && told, || format!("{platform:?}"))?;
     let mut settled = spec.clone();
@@ -379,18 +379,18 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     // A later part of the same study makes the same choice, and one of a study on a GPU stays there.
     let later = choice_like(&spec)?.or_cpu().after(&platform);
     require(later.device().gpu().is_none(), || "a later part goes back to the GPU".into())?;
-    let (_, there) = choice_like(&spec)?.open(&spec, spec.points)?;
+    let (_, there) = choice_like(&spec)?.open(&spec)?;
     require(there.backend == DeviceKind::Gpu, || format!("{there:?}"))?;
     let later = choice_like(&spec)?.or_cpu().after(&there);
     let own = later.device().gpu().ok_or("no GPU")?;
     let blocks = Blocks::new(spec.points).ok_or("n")?;
     let _ = own.pipeline::<f64>(blocks, own.capacity().variant(blocks, spec.solver()))?;
     own.lose();
-    named(later.open(&spec, spec.points), gpu, "the device was lost")
+    named(later.open(&spec), gpu, "the device was lost")
 }
 
 fn choice_like(spec: &Spec) -> curvelax::Result<placement::ChosenBackend> {
-    placement::choose(spec, spec.points)
+    placement::choose(spec)
 }
 
 fn no_room(gpu: &Gpu) -> Outcome {

@@ -227,7 +227,7 @@ fn finest(study: &Study) -> Option<usize> {
 /// Nodes of the members of `spec`, and how many of them are resident at once; a GPU is not opened for that.
 fn slots_at(spec: &Spec, choice: &ChosenBackend) -> Result<(usize, Option<usize>)> {
     let slots = match choice.device().kind() {
-        DeviceKind::Cpu => Some(choice.open(spec, spec.points)?.0.slots()),
+        DeviceKind::Cpu => Some(choice.open(spec)?.0.slots()),
         DeviceKind::Gpu => None,
     };
     Ok((spec.points, slots))

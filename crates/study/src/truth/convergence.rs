@@ -7,7 +7,7 @@ use super::{
 use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
-    Cell, Ended, Family, Outcome, Sink, Spec, Status,
+    Cell, Ended, Family, Outcome, Spec, Status,
     request::spec::{Precision, Solver},
     simulate::simulate,
 };
@@ -59,27 +59,18 @@ impl Problem {
     /// that ends early is not an error but has no ratio.
     pub fn solve(&self, method: &Spec, at: Resolution) -> Result<Solved> {
         let spec = self.spec(method, at).validate()?;
-        let choice = placement::choose(&spec, at.n)?;
+        let choice = placement::choose(&spec)?;
         let precision = choice.precision();
         let family = Family::of(&spec, self.curve.resolve(precision))?;
-        let (mut backend, _) = choice.open(&spec, at.n)?;
-        let mut last = Last(None);
-        simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut last)?;
-        let Some(Ended { outcome, portrait: Some(nodes), .. }) = last.0 else {
+        let (mut backend, _) = choice.open(&spec)?;
+        let mut ended: Vec<Ended> = Vec::new();
+        simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut ended)?;
+        let Some(Ended { outcome, portrait: Some(nodes), .. }) = ended.pop() else {
             return Err(Error::Failed(format!("{}: the run left no nodes", self.name)));
         };
         let arrived = matches!(outcome.status, Status::Relaxed | Status::Unfinished);
         let ratio = arrived.then(|| self.measure.of(&nodes.before, &nodes.after) / self.exact);
         Ok(Solved { ratio, outcome, precision })
-    }
-}
-
-struct Last(Option<Ended>);
-
-impl Sink for Last {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.0 = Some(ended.clone());
-        Ok(())
     }
 }
 

@@ -34,6 +34,6 @@ pub use convergence::{ConvergenceRow, ConvergenceStudy, Solved, Varied, studies}
 pub use measure::{Measure, mode_amplitude};
 pub use problems::{Beside, ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
 pub use referee::{Referee, Truth};
-pub use refereed::{RefereeRow, RefereedTime, limits, one_curve, relaxation_truth};
+pub use refereed::{RefereeRow, limits, one_curve, relaxation_truth};
 pub use theory::{CircleMode, circle_mode};
 pub use work_precision::{Stepping, WorkPrecision, WorkRow};

@@ -15,32 +15,13 @@ const TOLERANCE: f64 = 1e-5;
 /// Members that are refereed side by side.
 const BATCH: usize = 64;
 
-/// Whether a time is that of a resolution, or the limit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RefereedTime {
-    /// t_relax at a number of nodes.
-    Scheme,
-    /// t_limit.
-    Limit,
-}
-
-impl RefereedTime {
-    /// The name of its column in `summary.csv`.
-    pub fn name(self) -> &'static str {
-        match self {
-            RefereedTime::Scheme => "t_relax",
-            RefereedTime::Limit => "t_limit",
-        }
-    }
-}
-
 /// A relaxation time of a member, and that of the referee.
 #[derive(Clone, Debug)]
 pub struct RefereeRow {
     /// Index of the member.
     pub member: u64,
-    /// Which time it is.
-    pub time: RefereedTime,
+    /// Which time it is, as its column in `summary.csv`: `t_relax` at a number of nodes, or `t_limit`.
+    pub time: &'static str,
     /// Nodes; those of the finest level for a limit.
     pub points: usize,
     /// The time; unknown if the member did not relax.
@@ -121,8 +102,7 @@ pub fn one_curve(spec: &Spec) -> Result<Vec<RefereeRow>> {
     for points in NODES {
         for outcome in outcomes(&Study::new(at(points))?)? {
             let t = outcome.t_relax;
-            let mut row =
-                RefereeRow { time: RefereedTime::Scheme, t, t_error: None, ..limit(&outcome, points, Ok(truth)) };
+            let mut row = RefereeRow { time: "t_relax", t, t_error: None, ..limit(&outcome, points, Ok(truth)) };
             row.order = rows.last().and_then(|coarse| order(coarse, &row));
             rows.push(row);
         }
@@ -141,7 +121,7 @@ fn outcomes(study: &Study) -> Result<Vec<Outcome>> {
 
 fn limit(outcome: &Outcome, points: usize, truth: std::result::Result<Truth, String>) -> RefereeRow {
     let Outcome { member, t_limit: t, t_error, order, .. } = *outcome;
-    RefereeRow { member, time: RefereedTime::Limit, points, t, t_error, order, truth }
+    RefereeRow { member, time: "t_limit", points, t, t_error, order, truth }
 }
 
 /// The order at which the error falls between two rows; none where it changes its sign.

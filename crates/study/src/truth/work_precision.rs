@@ -8,7 +8,7 @@ use std::time::Instant;
 use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
-    Cell, Ended, Family, Sink, Spec,
+    Cell, Ended, Family, Outcome, Spec,
     request::spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Precision, Pull, Solver},
     simulate::simulate,
 };
@@ -99,41 +99,24 @@ fn median(values: Vec<f64>) -> Result<f64> {
     Ok(Description::new(values)?.median().unwrap_or(f64::NAN))
 }
 
-/// Relaxation times and work of a run.
-#[derive(Default)]
-struct RunTimes {
-    t_relax: Vec<Option<f64>>,
-    solves: u64,
-    sweeps: u64,
-}
-
-impl Sink for RunTimes {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        let outcome = &ended.outcome;
-        self.t_relax.push(outcome.t_relax);
-        self.solves += outcome.solves;
-        self.sweeps += outcome.sweeps_k + outcome.sweeps_x;
-        Ok(())
-    }
-}
-
 impl WorkPrecision {
     /// Computes the reference for runs where `method` says, with its number of nodes.
     ///
     /// # Errors
     /// [`Error::Request`] if `method` is not available, [`Error::Failed`] if a member of the reference does not relax.
     pub fn new(method: &Spec) -> Result<WorkPrecision> {
-        let precision = placement::choose(&method.clone().validate()?, method.points)?.precision();
-        let exact = Spec {
+        let precision = placement::choose(&method.clone().validate()?)?.precision();
+        let exactly = Spec {
             backend: BackendChoice::Cpu,
             adapter: None,
             precision: Some(Precision::F64),
             solver: Solver::Direct.into(),
             ..method.clone()
         };
-        let mut all = WorkPrecision { method: exact, precision: Precision::F64, reference: Vec::new() };
+        let mut all = WorkPrecision { method: exactly, precision: Precision::F64, reference: Vec::new() };
         let finest = Stepping::Adaptive { tolerance: FINEST, most_order: MOST_ORDER };
-        let RunTimes { t_relax: reference, .. } = all.run(Solver::Direct, &[finest], 1)?.remove(0).0;
+        let (exact, _) = all.run(Solver::Direct, &[finest], 1)?.remove(0);
+        let reference: Vec<Option<f64>> = exact.iter().map(|ended| ended.outcome.t_relax).collect();
         if reference.iter().any(Option::is_none) {
             return Err(Error::Failed("a member of the reference did not relax".into()));
         }
@@ -170,41 +153,43 @@ impl WorkPrecision {
     /// Those of the back end.
     pub fn rows(&self, solver: Solver, way: &[Stepping]) -> Result<Vec<WorkRow>> {
         let runs = self.run(solver, way, Effort::of(solver).repeats)?;
-        let row = |(stepping, (times, seconds)): (&Stepping, (RunTimes, f64))| {
-            let pairs = times.t_relax.iter().zip(&self.reference);
-            let errors: Option<Vec<f64>> = pairs.map(|(t, exact)| Some(((*t)? / (*exact)? - 1.0).abs())).collect();
-            let mean = |of: u64| of as f64 / times.t_relax.len() as f64;
+        let row = |(stepping, (members, seconds)): (&Stepping, (Vec<Ended>, f64))| {
+            let error = |(ended, exact): (&Ended, &Option<f64>)| Some((ended.outcome.t_relax? / (*exact)? - 1.0).abs());
+            let errors: Option<Vec<f64>> = members.iter().zip(&self.reference).map(error).collect();
+            let count = members.len() as f64;
+            let mean =
+                |of: fn(&Outcome) -> u64| members.iter().map(|ended| of(&ended.outcome)).sum::<u64>() as f64 / count;
             Ok(WorkRow {
                 solver,
                 stepping: *stepping,
                 error: errors.map(median).transpose()?,
-                solves: mean(times.solves),
-                sweeps: mean(times.sweeps),
-                seconds: seconds / times.t_relax.len() as f64,
+                solves: mean(|of| of.solves),
+                sweeps: mean(|of| of.sweeps_k + of.sweeps_x),
+                seconds: seconds / count,
             })
         };
         way.iter().zip(runs).map(row).collect()
     }
 
-    /// Runs all members once for each of `way`, and returns their times with the median of the seconds of `repeats`
+    /// Runs all members once for each of `way`, and returns how they end with the median of the seconds of `repeats`
     /// runs. The runs take turns, so that a disturbance of the machine meets all of them.
-    fn run(&self, solver: Solver, way: &[Stepping], repeats: usize) -> Result<Vec<(RunTimes, f64)>> {
-        let mut runs: Vec<(RunTimes, Vec<f64>)> = way.iter().map(|_| Default::default()).collect();
+    fn run(&self, solver: Solver, way: &[Stepping], repeats: usize) -> Result<Vec<(Vec<Ended>, f64)>> {
+        let mut runs: Vec<(Vec<Ended>, Vec<f64>)> = way.iter().map(|_| Default::default()).collect();
         let specs: Vec<Spec> = way.iter().map(|stepping| self.spec(solver, *stepping)).collect();
         let Some(first) = specs.first() else { return Ok(Vec::new()) };
-        let choice = placement::choose(first, first.points)?;
-        let (mut backend, _) = choice.open(first, first.points)?;
+        let choice = placement::choose(first)?;
+        let (mut backend, _) = choice.open(first)?;
         let family = Family::new(first)?;
         for _ in 0..repeats {
-            for (spec, (times, seconds)) in specs.iter().zip(&mut runs) {
-                *times = RunTimes::default();
+            for (spec, (members, seconds)) in specs.iter().zip(&mut runs) {
+                members.clear();
                 let cell = Cell::only(spec.clone().validate()?, family.clone());
                 let started = Instant::now();
-                simulate(&[cell], choice.precision(), backend.as_mut(), 0, times)?;
+                simulate(&[cell], choice.precision(), backend.as_mut(), 0, members)?;
                 seconds.push(started.elapsed().as_secs_f64());
             }
         }
-        runs.into_iter().map(|(times, seconds)| Ok((times, median(seconds)?))).collect()
+        runs.into_iter().map(|(members, seconds)| Ok((members, median(seconds)?))).collect()
     }
 
     /// The spec of a run: what `--accurate` recommends, with other steps.
