@@ -7,7 +7,7 @@ use crate::{
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Feature, LevelRow, Outcome, SeriesRow, Spec};
 use curvelax_study::results::{
-    cells::{CellColumn, EnsembleStatistics},
+    cells::{EnsembleStatistics, StatisticsField},
     explained::ExplainedRow,
     tally::MeanExcess,
 };
@@ -27,13 +27,13 @@ const OF_MEMBERS: [(&str, &str, &str); 3] = [
 /// # Errors
 /// As [`of_growing`].
 pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Result<Vec<ColumnText>> {
-    let of_cells = |columns: Vec<CellColumn>| {
-        columns.into_iter().map(|column| [column.name, column.holds.to_owned(), column.meaning]).collect()
+    let of_row = |row: Option<Vec<StatisticsField>>| {
+        row.into_iter().flatten().map(|field| [field.name, field.holds.to_owned(), field.meaning]).collect()
     };
     Ok(match name {
-        names::ENSEMBLE => of_cells(statistics.columns(spec)),
-        names::GROUPS => of_cells(statistics.group_columns()),
-        names::EVENT_STATISTICS => of_cells(statistics.event_columns()),
+        names::ENSEMBLE => of_row(statistics.rows(spec).next()),
+        names::GROUPS => of_row(statistics.group_rows().next()),
+        names::EVENT_STATISTICS => of_row(statistics.event_rows(spec).next()),
         names::EXPLAINED => of::<ExplainedRow>(),
         names::MEAN_EXCESS => of::<MeanExcess>(),
         _ => of_growing(name, spec)?,

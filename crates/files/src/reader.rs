@@ -147,7 +147,8 @@ pub fn tally(folder: &Path, provenance: &Provenance) -> Result<Tally> {
     let levels = levels(&inside(folder), spec)?;
     expected(folder, names::LEVELS, "rows", provenance.levels, levels.rows())?;
     let mut tally = Tally::of(spec, &levels);
-    (tally.mollified, tally.below_rounding) = (provenance.mollified, provenance.below_rounding);
+    tally.supplement.mollified = provenance.mollified;
+    tally.supplement.below_rounding = provenance.below_rounding;
     let mut rows = Summary::open(&inside(folder), spec, &levels)?;
     rows.try_for_each(|outcome| tally.add(&outcome?))?;
     let summary = |what: &str, told: u64, found: u64| expected(folder, names::SUMMARY, what, told, found);
@@ -195,7 +196,7 @@ pub fn rows(
     let mut rows = Summary::open(place, spec, levels)?;
     rows.try_for_each(|outcome| tally.add(&outcome?))?;
     rows.end()?;
-    tally.set_supplement(supplement);
+    tally.supplement = supplement;
     Ok(tally)
 }
 

@@ -17,7 +17,12 @@ use curvelax_files::{
 };
 use curvelax_study::{
     placement::Platform,
-    results::{RunVerdict, cells::EnsembleStatistics, provenance::Provenance, tally::Tally},
+    results::{
+        RunVerdict,
+        cells::{EnsembleStatistics, to_csv},
+        provenance::Provenance,
+        tally::Tally,
+    },
 };
 
 /// Output on stdout for a completed run.
@@ -92,12 +97,13 @@ impl Complete<'_> {
         let statistics = &EnsembleStatistics::new(spec, &mut tally)?;
         let tally = &tally;
         // Rows come first: they are saved even if the disk fills up.
-        files.push(folder.write(names::ENSEMBLE, statistics.to_csv(spec)?)?);
-        if let Some(groups) = statistics.groups_to_csv()? {
-            files.push(folder.write(names::GROUPS, groups)?);
+        files.push(folder.write(names::ENSEMBLE, to_csv(names::ENSEMBLE, statistics.rows(spec))?)?);
+        if !statistics.groups.is_empty() {
+            files.push(folder.write(names::GROUPS, to_csv(names::GROUPS, statistics.group_rows())?)?);
         }
         if !spec.event.is_empty() {
-            files.push(folder.write(names::EVENT_STATISTICS, statistics.events_to_csv(spec)?)?);
+            let events = to_csv(names::EVENT_STATISTICS, statistics.event_rows(spec))?;
+            files.push(folder.write(names::EVENT_STATISTICS, events)?);
         }
         let excess = &tally.mean_excess(spec)?;
         files.push(Table::of(folder.file(names::MEAN_EXCESS)?, excess)?);

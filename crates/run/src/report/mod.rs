@@ -252,7 +252,7 @@ impl RunReport {
             tables,
             store,
             rows,
-            supplement: self.tally.supplement(),
+            supplement: self.tally.supplement.clone(),
             films: self.films.clone(),
         })
     }

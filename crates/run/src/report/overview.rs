@@ -55,8 +55,8 @@ impl fmt::Display for Overview<'_> {
         self.groups(f)?;
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
-            ("outlines", self.tally.mollified.outlines().unwrap_or_default()),
-            ("smoothing", self.tally.mollified.smoothing().unwrap_or_default()),
+            ("outlines", self.tally.supplement.mollified.outlines().unwrap_or_default()),
+            ("smoothing", self.tally.supplement.mollified.smoothing().unwrap_or_default()),
             (self.statistics.time(), self.relaxation()),
             ("t_relax", self.raw()),
             ("error", self.error()),
@@ -363,10 +363,10 @@ results    out: summary.csv, run.json
             )),
             "{some}"
         );
-        tally.cells[0].judged.iter_mut().for_each(|limit| limit.asymptotic = true);
+        tally.cells[0].relaxing.judged.iter_mut().for_each(|limit| limit.asymptotic = true);
         // Sampling is the larger one here.
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
-        tally.cells[0].judged.iter_mut().for_each(|limit| limit.relative = -0.2);
+        tally.cells[0].relaxing.judged.iter_mut().for_each(|limit| limit.relative = -0.2);
         assert!(told(&tally).ends_with(" dominates; add --accurate to remove it"), "{}", told(&tally));
     }
 

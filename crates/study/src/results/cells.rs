@@ -13,6 +13,8 @@ use super::{
     times::{Numbers, QUANTILES, Statistic, TimeStatistics, covered, intervals, places},
 };
 use csv::WriterBuilder;
+use serde::Serialize;
+
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, Status};
 use curvelax_statistics::{Description, Interval, Mean, Sample, interval};
@@ -84,14 +86,24 @@ impl Rates {
     }
 }
 
-/// A column of `ensemble.csv`.
-pub struct CellColumn {
+/// A field of a row of statistics, with what its column says.
+pub struct StatisticsField {
     /// The heading.
     pub name: String,
     /// What a field holds.
     pub holds: &'static str,
     /// What it means.
     pub meaning: String,
+    value: FieldValue,
+}
+
+/// What is written to a field.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum FieldValue {
+    Word(String),
+    Count(u64),
+    Number(Option<f64>),
 }
 
 /// Relaxation times of the outlines of one group in a cell.
@@ -133,26 +145,15 @@ impl EnsembleStatistics {
 impl CellStatistics {
     /// Moves times and rates out of `tally`.
     fn new(spec: &Spec, cell: u64, tally: &mut CellTally, relative: bool) -> Result<CellStatistics> {
-        let times = TimeStatistics::new(mem::take(&mut tally.times));
         let (values, counts) = (spec.sweep.labels(cell), tally.counts);
+        let copies = !spec.has_different_members() && !spec.sweep.has("amplitude");
+        let relaxing = EventStatistics::new(mem::take(&mut tally.relaxing), copies)?;
         let rates = Rates::new(&mem::take(&mut tally.rates), relative)?;
-        let (judged, copies) =
-            (mem::take(&mut tally.judged), !spec.has_different_members() && !spec.sweep.has("amplitude"));
-        let discretisation = DiscretisationError::of(&judged)?;
-        let limits = CellLimits::of(&mem::take(&mut tally.limits), &judged, copies)?;
-        let statistics = |of: EventTally| {
-            let EventTally { times, limits, judged, stopped, .. } = of;
-            let discretisation = DiscretisationError::of(&judged)?;
-            let (times, limits) = match stopped {
-                0 => (TimeStatistics::new(times), CellLimits::of(&limits, &judged, copies)?),
-                _ => (TimeStatistics::unknown(times), None),
-            };
-            Ok(EventStatistics { times, discretisation, limits, stopped })
-        };
         let mut of_events = mem::take(&mut tally.events).into_iter();
-        let events = spec.event.iter().map(|_| statistics(of_events.next().unwrap_or_default()));
+        let events = spec.event.iter().map(|_| EventStatistics::new(of_events.next().unwrap_or_default(), copies));
         let events = events.collect::<Result<_>>()?;
-        let vanishing = statistics(mem::take(&mut tally.vanishing))?;
+        let vanishing = EventStatistics::new(mem::take(&mut tally.vanishing), copies)?;
+        let EventStatistics { times, discretisation, limits, .. } = relaxing;
         Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events, vanishing })
     }
 
@@ -189,15 +190,29 @@ impl CellStatistics {
         Numbers { known, named: named.collect(), intervals: Vec::new() }
     }
 
-    /// The same two, with their names.
-    fn vanishing(&self) -> [(&'static str, Numbers); 2] {
-        [("t_vanish", self.vanished()), ("t_vanish_limit", self.vanished_limit())]
-    }
-
-    /// The quantities in the table, with their numbers.
-    fn quantities(&self) -> [(&'static str, Numbers); 4] {
-        let (times, rates) = (self.times.numbers(), self.rates.numbers.clone());
-        [("t_relax", times), ("rate", rates), ("discretisation", self.errors()), ("t_limit", self.limit())]
+    /// The row of a table, with `keys` after the index of the cell.
+    fn row(&self, keys: impl Iterator<Item = StatisticsField>) -> Vec<StatisticsField> {
+        let quantities = [
+            ("t_relax", self.times.numbers()),
+            ("rate", self.rates.numbers.clone()),
+            ("discretisation", self.errors()),
+            ("t_limit", self.limit()),
+        ];
+        let vanishing = [("t_vanish", self.vanished()), ("t_vanish_limit", self.vanished_limit())];
+        let mut row = vec![count("cell", self.cell, "index of the cell, from 0")];
+        row.extend(keys);
+        row.push(count("members", self.members(), "members that ended"));
+        let statuses = Status::ALL.map(Status::name).into_iter().zip(self.counts);
+        row.extend(statuses.map(|(name, members)| count(name, members, format!("members that ended {name}"))));
+        let with_known = |(quantity, numbers): &(&str, Numbers)| {
+            let meaning = format!("members with a {quantity}");
+            let known = count(format!("{quantity}_known"), numbers.known as u64, meaning);
+            [known].into_iter().chain(floats(quantity, &numbers.named)).collect::<Vec<_>>()
+        };
+        row.extend(quantities.iter().flat_map(with_known));
+        row.extend(quantities.iter().flat_map(|(quantity, numbers)| floats(quantity, &numbers.intervals)));
+        row.extend(vanishing.iter().flat_map(with_known));
+        row
     }
 
     /// The times that are shown: the limits, if they are asked for.
@@ -235,6 +250,17 @@ impl CellStatistics {
 }
 
 impl EventStatistics {
+    /// The statistics of a kind of time; `copies` says that all members are one curve.
+    fn new(of: EventTally, copies: bool) -> Result<EventStatistics> {
+        let EventTally { times, limits, judged, stopped, .. } = of;
+        let discretisation = DiscretisationError::of(&judged)?;
+        let (times, limits) = match stopped {
+            0 => (TimeStatistics::new(times), CellLimits::of(&limits, &judged, copies)?),
+            _ => (TimeStatistics::unknown(times), None),
+        };
+        Ok(EventStatistics { times, discretisation, limits, stopped })
+    }
+
     /// The numbers on its error of discretisation, for the table.
     pub fn errors(&self) -> Numbers {
         errors(self.discretisation.as_ref(), OF_EVENT)
@@ -354,122 +380,73 @@ impl EnsembleStatistics {
         if self.of_limits { "t_limit" } else { "t_relax" }
     }
 
-    /// The columns of `ensemble.csv`.
-    pub fn columns(&self, spec: &Spec) -> Vec<CellColumn> {
-        let keys = spec.sweep.axes().iter();
-        let keys = keys.map(|axis| column(axis.key.clone(), "swept value", format!("--{} of the cell", axis.key)));
-        self.columns_after(keys.collect())
+    /// The rows of `ensemble.csv`.
+    pub fn rows(&self, spec: &Spec) -> impl Iterator<Item = Vec<StatisticsField>> {
+        self.cells.iter().map(|cell| {
+            let keys = spec.sweep.axes().iter().map(|axis| &axis.key).zip(&cell.values);
+            cell.row(keys.map(|(key, value)| word(key, "swept value", value, format!("--{key} of the cell"))))
+        })
     }
 
-    /// The columns of `groups.csv`.
-    pub fn group_columns(&self) -> Vec<CellColumn> {
-        let group = column("group".into(), "word", "value of the property `--group-by`".into());
-        self.columns_after(vec![group])
+    /// The rows of `groups.csv`, if outlines are grouped.
+    pub fn group_rows(&self) -> impl Iterator<Item = Vec<StatisticsField>> {
+        let key = |group| word("group", "word", group, "value of the property `--group-by`");
+        self.groups.iter().map(move |of| of.times.row([key(&of.group)].into_iter()))
     }
 
-    /// The index of the cell, `keys`, and the numbers.
-    fn columns_after(&self, keys: Vec<CellColumn>) -> Vec<CellColumn> {
-        let statuses = Status::ALL.into_iter().map(Status::name);
-        let statuses = statuses.map(|name| column(name.into(), "integer", format!("members that ended {name}")));
-        let quantities = || self.cells.first().into_iter().flat_map(CellStatistics::quantities);
-        let float = |quantity: &str, Statistic { name, meaning, .. }: &Statistic| {
-            column(format!("{quantity}_{name}"), "float", format!("{quantity}: {meaning}"))
-        };
-        let with_known = |(quantity, numbers): (&str, Numbers)| {
-            let known = column(format!("{quantity}_known"), "integer", format!("members with a {quantity}"));
-            [known].into_iter().chain(numbers.named.iter().map(|of| float(quantity, of)).collect::<Vec<_>>())
-        };
-        let intervals = quantities()
-            .flat_map(|(quantity, numbers)| numbers.intervals.iter().map(|of| float(quantity, of)).collect::<Vec<_>>());
-        let mut all = vec![column("cell".into(), "integer", "index of the cell, from 0".into())];
-        all.extend(keys);
-        all.push(column("members".into(), "integer", "members that ended".into()));
-        all.extend(statuses.chain(quantities().flat_map(with_known)).chain(intervals));
-        all.extend(self.cells.first().into_iter().flat_map(CellStatistics::vanishing).flat_map(with_known));
-        all
-    }
-
-    /// The columns of `event_statistics.csv`.
-    pub fn event_columns(&self) -> Vec<CellColumn> {
-        let column =
-            |name: &str, holds, meaning: &str| CellColumn { name: name.into(), holds, meaning: meaning.into() };
-        let mut all = vec![
-            column("cell", "integer", "index of the cell, from 0"),
-            column("event", "word", "name of the event"),
-            column("members", "integer", "members that ended"),
-            column("known", "integer", "members of which the event was seen"),
-        ];
-        let some = self.cells.iter().flat_map(|cell| &cell.events).next();
-        let named = |numbers: Option<Numbers>| numbers.map_or((vec![], vec![]), |of| (of.named, of.intervals));
-        let (times, intervals) = named(some.map(|of| of.times.numbers()));
-        let (errors, _) = named(some.map(EventStatistics::errors));
-        let (limits, of_limits) = named(some.map(EventStatistics::limit));
-        all.extend(times.iter().map(|of| column(of.name, "float", of.meaning)));
-        all.push(column("discretisation_known", "integer", "members of which that is known"));
-        all.extend(errors.iter().map(|of| column(&format!("discretisation_{}", of.name), "float", of.meaning)));
-        all.extend(intervals.iter().map(|of| column(of.name, "float", of.meaning)));
-        all.push(column(
-            "t_limit_known",
-            "integer",
-            "members of which the limit of the time is known, with `--refine`",
-        ));
-        let limits = limits.iter().chain(&of_limits);
-        all.extend(limits.map(|of| column(&format!("t_limit_{}", of.name), "float", of.meaning)));
-        all
-    }
-
-    /// The text of `event_statistics.csv`: the events of each cell, in the order of the spec.
-    pub fn events_to_csv(&self, spec: &Spec) -> Result<String> {
-        let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write event_statistics.csv: {e}"));
-        let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-        writer.write_record(self.event_columns().into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
-        for (cell, (event, of)) in
-            self.cells.iter().flat_map(|cell| spec.event.iter().zip(&cell.events).map(move |of| (cell, of)))
-        {
-            let values = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
-            let (times, errors) = (of.times.numbers(), of.errors());
-            let (seen, judged) = ((times.known, values(&times.named)), (errors.known, values(&errors.named)));
-            let limit = of.limit();
-            let limits = (limit.known, values(&limit.named), values(&limit.intervals));
-            let row = (cell.cell, &event.name, of.times.sample.len(), seen, judged, values(&times.intervals), limits);
-            writer.serialize(row).map_err(|e| failed(&e))?;
-        }
-        let bytes = writer.into_inner().map_err(|e| failed(&e))?;
-        String::from_utf8(bytes).map_err(|e| failed(&e))
-    }
-
-    /// The text of `ensemble.csv`.
-    pub fn to_csv(&self, spec: &Spec) -> Result<String> {
-        table(self.columns(spec), self.cells.iter().map(|cell| (&cell.values[..], cell)))
-    }
-
-    /// The text of `groups.csv`, if outlines are grouped.
-    pub fn groups_to_csv(&self) -> Result<Option<String>> {
-        let rows = self.groups.iter().map(|group| (std::slice::from_ref(&group.group), &group.times));
-        (!self.groups.is_empty()).then(|| table(self.group_columns(), rows)).transpose()
+    /// The rows of `event_statistics.csv`: the events of each cell, in the order of the spec.
+    pub fn event_rows<'a>(&'a self, spec: &'a Spec) -> impl Iterator<Item = Vec<StatisticsField>> {
+        let of_cell = |cell: &'a CellStatistics| spec.event.iter().zip(&cell.events).map(move |of| (cell.cell, of));
+        self.cells.iter().flat_map(of_cell).map(|(cell, (event, of))| {
+            let (times, errors, limits) = (of.times.numbers(), of.errors(), of.limit());
+            let mut row = vec![
+                count("cell", cell, "index of the cell, from 0"),
+                word("event", "word", &event.name, "name of the event"),
+                count("members", of.times.sample.len() as u64, "members that ended"),
+                count("known", times.known as u64, "members of which the event was seen"),
+            ];
+            row.extend(floats("", &times.named));
+            row.push(count("discretisation_known", errors.known as u64, "members of which that is known"));
+            row.extend(floats("discretisation", &errors.named).chain(floats("", &times.intervals)));
+            let meaning = "members of which the limit of the time is known, with `--refine`";
+            row.push(count("t_limit_known", limits.known as u64, meaning));
+            row.extend(floats("t_limit", &limits.named).chain(floats("t_limit", &limits.intervals)));
+            row
+        })
     }
 }
 
-fn column(name: String, holds: &'static str, meaning: String) -> CellColumn {
-    CellColumn { name, holds, meaning }
+fn word(name: impl Into<String>, holds: &'static str, value: &str, meaning: impl Into<String>) -> StatisticsField {
+    let (name, meaning) = (name.into(), meaning.into());
+    StatisticsField { name, holds, meaning, value: FieldValue::Word(value.into()) }
 }
 
-/// A table of these columns, with a row for each cell or group after its values.
-fn table<'a>(
-    columns: Vec<CellColumn>,
-    rows: impl Iterator<Item = (&'a [String], &'a CellStatistics)>,
-) -> Result<String> {
-    let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write statistics as CSV: {e}"));
+fn count(name: impl Into<String>, value: u64, meaning: impl Into<String>) -> StatisticsField {
+    let (name, meaning) = (name.into(), meaning.into());
+    StatisticsField { name, holds: "integer", meaning, value: FieldValue::Count(value) }
+}
+
+/// The fields of some numbers on a quantity, which has no name where it is the only one.
+fn floats(quantity: &str, of: &[Statistic]) -> impl Iterator<Item = StatisticsField> {
+    let [joint, colon] = if quantity.is_empty() { [""; 2] } else { ["_", ": "] };
+    of.iter().map(move |Statistic { name, value, meaning }| StatisticsField {
+        name: format!("{quantity}{joint}{name}"),
+        holds: "float",
+        meaning: format!("{quantity}{colon}{meaning}"),
+        value: FieldValue::Number(*value),
+    })
+}
+
+/// The text of a table of these rows, of which there is one at least; `name` is used in the error message.
+pub fn to_csv(name: &str, rows: impl Iterator<Item = Vec<StatisticsField>>) -> Result<String> {
+    let failed = |e: &dyn std::fmt::Display| Error::Failed(format!("cannot write {name}: {e}"));
     let mut writer = WriterBuilder::new().has_headers(false).from_writer(Vec::new());
-    writer.write_record(columns.into_iter().map(|column| column.name)).map_err(|e| failed(&e))?;
-    for (values, of) in rows {
-        let quantities = of.quantities();
-        let values_of = |of: &[Statistic]| of.iter().map(|number| number.value).collect::<Vec<_>>();
-        let numbers = quantities.each_ref().map(|(_, numbers)| (numbers.known, values_of(&numbers.named)));
-        let intervals = quantities.each_ref().map(|(_, numbers)| values_of(&numbers.intervals));
-        let vanished = of.vanishing().map(|(_, of)| (of.known, values_of(&of.named)));
-        let row = (of.cell, values, of.members(), of.counts, numbers, intervals, vanished);
-        writer.serialize(row).map_err(|e| failed(&e))?;
+    let mut rows = rows.peekable();
+    let names: Vec<&str> = rows.peek().into_iter().flatten().map(|field| &*field.name).collect();
+    writer.write_record(names).map_err(|e| failed(&e))?;
+    for row in rows {
+        let values: Vec<FieldValue> = row.into_iter().map(|field| field.value).collect();
+        writer.serialize(values).map_err(|e| failed(&e))?;
     }
     let bytes = writer.into_inner().map_err(|e| failed(&e))?;
     String::from_utf8(bytes).map_err(|e| failed(&e))
@@ -498,7 +475,7 @@ mod tests {
     fn a_table_looks_like_this() {
         let members = [(0, Some(0.5)), (0, Some(1.5)), (1, Some(1.0)), (1, None)];
         let (spec, statistics) = statistics("shape=ellipse:2,1;circle:1", &members);
-        let text = statistics.to_csv(&spec).unwrap();
+        let text = to_csv("ensemble.csv", statistics.rows(&spec)).unwrap();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
             lines[0],
@@ -524,7 +501,7 @@ mod tests {
     #[test]
     fn cells_without_times_have_empty_fields_and_no_nan() {
         let (spec, statistics) = statistics("omega=1,2,3", &[(0, None), (0, None), (2, Some(0.0))]);
-        let text = statistics.to_csv(&spec).unwrap();
+        let text = to_csv("ensemble.csv", statistics.rows(&spec)).unwrap();
         assert!(!text.contains("NaN") && !text.contains("inf"), "{text}");
         let (lines, gap): (Vec<&str>, _) = (text.lines().skip(1).collect(), ",".repeat(12));
         // Of both it is known that they relax later than 2: so does the median with 75 %, the 95 % quantile with 99.75

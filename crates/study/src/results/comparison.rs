@@ -9,7 +9,7 @@
 
 use std::{cmp::Ordering, ops::Range};
 
-use super::tally::{CellTally, Tally};
+use super::tally::{CellTally, EventTally, Tally};
 use curvelax_base::error::Result;
 use curvelax_ensemble::Spec;
 use curvelax_statistics::{LogRank, Observation, PairedDifferences, Sample, SignedRank, log_rank};
@@ -139,7 +139,7 @@ impl CellComparison {
         }
         let none = CellTally::default();
         let times = |cell: u64| {
-            let CellTally { times, limits, .. } = tally.cells.get(cell as usize).unwrap_or(&none);
+            let EventTally { times, limits, .. } = &tally.cells.get(cell as usize).unwrap_or(&none).relaxing;
             if of_limits { limits } else { times }
         };
         if let Some(cell) = (0..count).find(|cell| ranks(spec, *cell).count() != times(*cell).len()) {

@@ -53,12 +53,8 @@ pub struct Tally {
     pub levels: u64,
     /// Of the members with limits, those whose times needed more nodes than they have.
     pub nodes: FinerMembers,
-    /// Members whose corners were rounded off before the run.
-    pub mollified: MollifiedMembers,
-    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
-    drifted: (u64, f64),
-    /// Members whose relaxation time is unknown because their threshold is below the rounding of the precision.
-    pub below_rounding: u64,
+    /// What is in no row of the summary.
+    pub supplement: TallySupplement,
     /// Members of outlines whose points leave more than [`OPEN_BY_POINTS`] of the limit open, and the largest share.
     coarse: (u64, f64),
     /// Whether corners are those of outlines.
@@ -149,11 +145,9 @@ pub struct CellTally {
     pub counts: [u64; Status::ALL.len()],
     /// Times at which members relaxed, or up to which they had not: 0 for a vesicle that is not at rest at its end, of
     /// which nothing is known.
-    pub times: Observations,
+    pub relaxing: EventTally,
     /// Such vesicles.
     moving: u64,
-    /// Members that relaxed, and have no limit of the time although one was asked for.
-    without_limit: u64,
     /// Members that have not relaxed, by status.
     pub others: [u64; Status::ALL.len()],
     /// Simple curves whose final time came before they relaxed.
@@ -162,19 +156,13 @@ pub struct CellTally {
     pub area: f64,
     /// Rates of the members that have one.
     pub rates: Vec<Rate>,
-    /// Excess at the times of [`grid`], over the members that reached them.
-    pub excess: Vec<Spread>,
-    /// Limits of the times, of the members that have one; censored like the times for the others.
-    pub limits: Observations,
-    /// What the levels tell of the members that ran at them.
-    pub judged: Vec<Limit>,
     /// By event, in the order of the spec.
     pub events: Vec<EventTally>,
     /// Times at which members vanished, of driven ones.
     pub vanishing: EventTally,
 }
 
-/// Totals over the members of one cell, for one event.
+/// Totals over the members of one cell, for one kind of time: that of relaxation, of an event, or of vanishing.
 #[derive(Clone, Debug, Default)]
 pub struct EventTally {
     /// Times at which it happened, or up to which it had not.
@@ -203,50 +191,44 @@ struct Counted {
 impl CellTally {
     fn add(&mut self, outcome: &Outcome, counted: Counted) -> Result<()> {
         let Counted { refined, stops, driven, vesicles } = counted;
-        let CellTally { counts, times, others, late, area, rates, limits, judged, events, vanishing, .. } = self;
-        let later_than = if vesicles { 0.0 } else { outcome.t_end };
-        times.push(Observation::new(outcome.t_relax, later_than))?;
-        self.moving += u64::from(vesicles && outcome.status == Status::Unfinished);
-        // One without a limit that relaxed is known to take about that long: the slow ones must not drop out.
-        let limited = |limit: Option<f64>, t: Option<f64>, later_than: f64| match limit {
-            Some(_) => Observation::new(limit, later_than),
-            None => Observation::new(None, t.unwrap_or(later_than)),
-        };
-        if refined {
-            limits.push(limited(outcome.t_limit, outcome.t_relax, later_than))?;
-            self.without_limit += u64::from(outcome.t_relax.is_some() && outcome.t_limit.is_none());
-        }
-        judged.extend(outcome.judged);
+        let CellTally { counts, others, late, area, rates, events, vanishing, .. } = self;
+        let Outcome { t_end, t_relax, t_vanish, status, .. } = *outcome;
+        let (later_than, stopped) = (if vesicles { 0.0 } else { t_end }, stops && status == Status::Relaxed);
+        self.relaxing.add(t_relax, later_than, outcome.judged, refined)?;
+        self.moving += u64::from(vesicles && status == Status::Unfinished);
         events.resize_with(outcome.events.len().max(events.len()), EventTally::default);
         for (i, (own, t)) in events.iter_mut().zip(&outcome.events).enumerate() {
-            own.times.push(Observation::new(*t, outcome.t_end))?;
-            own.reached += u64::from(t.is_some());
-            own.stopped += u64::from(stops && t.is_none() && outcome.status == Status::Relaxed);
-            let judged = outcome.limit_of_event(i);
-            if refined {
-                own.limits.push(limited(judged.map(|limit| limit.t), *t, outcome.t_end))?;
-                own.without_limit += u64::from(t.is_some() && judged.is_none());
-            }
-            own.judged.extend(judged);
+            own.add(*t, t_end, outcome.limit_of_event(i), refined)?;
+            own.stopped += u64::from(stopped && t.is_none());
         }
         if driven {
-            vanishing.times.push(Observation::new(outcome.t_vanish, outcome.t_end))?;
-            if refined {
-                vanishing.limits.push(limited(outcome.t_vanish_limit, outcome.t_vanish, outcome.t_end))?;
-                vanishing.without_limit += u64::from(outcome.t_vanish.is_some() && outcome.t_vanish_limit.is_none());
-            }
-            vanishing.judged.extend(outcome.judged_vanishing);
-            vanishing.reached += u64::from(outcome.t_vanish.is_some());
-            vanishing.stopped += u64::from(stops && outcome.status == Status::Relaxed);
+            vanishing.add(t_vanish, t_end, outcome.judged_vanishing, refined)?;
+            vanishing.stopped += u64::from(stopped);
         }
-        *late += u64::from(outcome.status == Status::Unfinished && outcome.end.turning.abs() == 1);
+        *late += u64::from(status == Status::Unfinished && outcome.end.turning.abs() == 1);
         *area += outcome.start.area.abs();
         rates.extend(outcome.rate.map(|fitted| Rate { fitted, theory: outcome.rate_theory.unwrap_or(f64::NAN) }));
-        for (counts, counted) in [(counts, true), (others, outcome.t_relax.is_none())] {
-            for (count, status) in counts.iter_mut().zip(Status::ALL) {
-                *count += u64::from(counted && status == outcome.status);
+        for (counts, counted) in [(counts, true), (others, t_relax.is_none())] {
+            for (count, own) in counts.iter_mut().zip(Status::ALL) {
+                *count += u64::from(counted && own == status);
             }
         }
+        Ok(())
+    }
+}
+
+impl EventTally {
+    /// Adds the time of a member, or the one up to which it is not known, with what the levels tell of it.
+    fn add(&mut self, t: Option<f64>, later_than: f64, judged: Option<Limit>, refined: bool) -> Result<()> {
+        self.times.push(Observation::new(t, later_than))?;
+        if refined {
+            // One without a limit that was reached is known to take about that long: the slow ones must not drop out.
+            let censored = if judged.is_some() { later_than } else { t.unwrap_or(later_than) };
+            self.limits.push(Observation::new(judged.map(|limit| limit.t), censored))?;
+            self.without_limit += u64::from(t.is_some() && judged.is_none());
+        }
+        self.judged.extend(judged);
+        self.reached += u64::from(t.is_some());
         Ok(())
     }
 }
@@ -257,11 +239,14 @@ const RELAXED: usize = 0;
 /// The part of a [`Tally`] that cannot be recomputed from `summary.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TallySupplement {
-    mollified: MollifiedMembers,
+    /// Members whose corners were rounded off before the run.
+    pub mollified: MollifiedMembers,
+    /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`], and the largest drift.
     drifted: (u64, f64),
-    below_rounding: u64,
-    /// By cell.
-    excess: Vec<Vec<Spread>>,
+    /// Members whose relaxation time is unknown because their threshold is below the rounding of the precision.
+    pub below_rounding: u64,
+    /// By cell: the excess at the times of [`grid`], over the members that reached them.
+    pub excess: Vec<Vec<Spread>>,
 }
 
 impl TallySupplement {
@@ -372,8 +357,9 @@ impl Tally {
             self.coarse = (self.coarse.0 + u64::from(share > OPEN_BY_POINTS), self.coarse.1.max(share));
         }
         let drift = outcome.end.metric_drift;
-        self.drifted.0 += u64::from(drift > DISTRUSTED_DRIFT);
-        self.drifted.1 = self.drifted.1.max(drift);
+        let TallySupplement { drifted: (drifted, worst), .. } = &mut self.supplement;
+        *drifted += u64::from(drift > DISTRUSTED_DRIFT);
+        *worst = worst.max(drift);
         // A table read from disk may contain anything.
         self.steps = self.steps.saturating_add(outcome.steps);
         self.solves = self.solves.saturating_add(outcome.solves);
@@ -385,8 +371,8 @@ impl Tally {
     /// Whether members have limits, in each cell in which any relaxed.
     pub fn has_limits(&self) -> bool {
         let any = |of: &Observations| of.iter().any(|seen| seen.happened);
-        self.cells.iter().any(|cell| any(&cell.limits))
-            && self.cells.iter().all(|cell| any(&cell.limits) || !any(&cell.times))
+        let mut cells = self.cells.iter().map(|cell| &cell.relaxing);
+        cells.clone().any(|of| any(&of.limits)) && cells.all(|of| any(&of.limits) || !any(&of.times))
     }
 
     /// The time of `member`, if it is known by name.
@@ -396,38 +382,22 @@ impl Tally {
 
     /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`].
     pub fn distrusted(&self) -> u64 {
-        self.drifted.0
+        self.supplement.drifted.0
     }
 
     /// Adds the excess of a member of `cell`, at the times of [`grid`] that it reached.
     pub fn add_excess(&mut self, cell: u64, excess: &[f64]) {
-        let Some(tally) = self.cells.get_mut(cell as usize) else { return };
-        tally.excess.resize_with(tally.excess.len().max(excess.len()), Spread::default);
-        tally.excess.iter_mut().zip(excess).for_each(|(spread, excess)| spread.add(*excess));
+        let (cell, all) = (cell as usize, &mut self.supplement.excess);
+        all.resize_with(all.len().max(cell + 1), Vec::new);
+        let own = &mut all[cell];
+        own.resize_with(own.len().max(excess.len()), Spread::default);
+        own.iter_mut().zip(excess).for_each(|(spread, excess)| spread.add(*excess));
     }
 
     /// Adds data that are not in a row of the summary.
     pub fn add_supplement(&mut self, mollified: &Mollified, unresolved: bool) {
-        self.mollified.add(mollified);
-        self.below_rounding += u64::from(unresolved);
-    }
-
-    /// Returns the data that are not in rows.
-    pub fn supplement(&self) -> TallySupplement {
-        let Tally { mollified, drifted, below_rounding, .. } = *self;
-        TallySupplement {
-            mollified,
-            drifted,
-            below_rounding,
-            excess: self.cells.iter().map(|cell| cell.excess.clone()).collect(),
-        }
-    }
-
-    /// Sets the data that are not in rows, after all rows were added.
-    pub fn set_supplement(&mut self, supplement: TallySupplement) {
-        let TallySupplement { mollified, drifted, below_rounding, excess } = supplement;
-        (self.mollified, self.drifted, self.below_rounding) = (mollified, drifted, below_rounding);
-        self.cells.iter_mut().zip(excess).for_each(|(cell, excess)| cell.excess = excess);
+        self.supplement.mollified.add(mollified);
+        self.supplement.below_rounding += u64::from(unresolved);
     }
 
     /// Returns the rows of `mean_excess.csv`.
@@ -436,7 +406,7 @@ impl Tally {
     /// [`Error::Request`](curvelax_base::error::Error::Request) if the values of a cell do not fit `spec`.
     pub fn mean_excess(&self, spec: &Spec) -> Result<Vec<MeanExcess>> {
         let mut rows = Vec::new();
-        for (cell, CellTally { excess, .. }) in (0..).zip(&self.cells) {
+        for (cell, excess) in (0..).zip(&self.supplement.excess) {
             let t_end = spec.of_cell(cell)?.final_time();
             let row = |(t, of): (f64, &Spread)| MeanExcess::new(cell, t, of);
             rows.extend(grid(t_end).zip(excess).map(row));
@@ -503,23 +473,23 @@ mod tests {
     fn outlines_that_the_nodes_do_not_resolve_are_warned_of() {
         let mut tally = tally(&[1.0, 2.0, 3.0, 4.0], 0);
         let well = Mollified { rounds: 7, area_change: -0.05, ..Mollified::default() };
-        assert_eq!(tally.mollified.smoothing(), None);
+        assert_eq!(tally.supplement.mollified.smoothing(), None);
         tally.add_supplement(&well, false);
-        assert_eq!((tally.warnings(), tally.mollified.members), (vec![], 1));
+        assert_eq!((tally.warnings(), tally.supplement.mollified.members), (vec![], 1));
         let words = "1 member was smoothed until the nodes resolved its outline, in at most 7 rounds: the area changed \
                      by at most 5.0 %";
-        assert_eq!(tally.mollified.smoothing(), Some(format!("{words}, which was then restored")));
+        assert_eq!(tally.supplement.mollified.smoothing(), Some(format!("{words}, which was then restored")));
         tally.add_supplement(&Mollified { crossed: true, sharp: true, ..well }, false);
         tally.add_supplement(&Mollified { area_change: -0.2, ..well }, false);
-        assert!(tally.mollified.smoothing().is_some_and(|told| told.ends_with("by at most 20 %")));
-        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.mollified;
+        assert!(tally.supplement.mollified.smoothing().is_some_and(|told| told.ends_with("by at most 20 %")));
+        let MollifiedMembers { unresolved, crossed, sharp, distorted, .. } = tally.supplement.mollified;
         assert_eq!((unresolved, crossed, sharp, distorted), (2, 1, 1, 1));
         let warnings = tally.warnings();
         assert!(warnings[0].starts_with("2 of 4 members started from an outline with parts thinner"), "{warnings:?}");
         let parts =
             "1 with crossings that the outline has not, 1 with a turn left above 1.5 rad, 1 with an area changed";
         assert!(warnings[0].contains(parts) && warnings[0].contains("more than 10 %; use more --points"));
-        tally.mollified.crossed = 0;
+        tally.supplement.mollified.crossed = 0;
         assert!(!tally.warnings()[0].contains("crossings"));
     }
 

@@ -43,40 +43,40 @@ pub struct MollifiedMembers {
 impl MollifiedMembers {
     /// Adds one member.
     pub(super) fn add(&mut self, mollified: &Mollified) {
-        self.members += u64::from(mollified.rounds > 0);
-        self.most_rounds = self.most_rounds.max(mollified.rounds);
-        self.largest_area_change = self.largest_area_change.max(mollified.area_change.abs());
         let faults = [mollified.crossed, mollified.sharp, mollified.distorted()];
-        self.unresolved += u64::from(faults.contains(&true));
-        for (count, fault) in [&mut self.crossed, &mut self.sharp, &mut self.distorted].into_iter().zip(faults) {
-            *count += u64::from(fault);
-        }
+        let [crossed, sharp, distorted] = faults.map(u64::from);
         let Treated { points, corners, rounded, area_change } = mollified.outline;
-        self.splines += u64::from(points > 0 && corners == 0);
-        self.cornered += u64::from(0 < corners && corners < points);
-        self.polygons += u64::from(points > 0 && corners >= points);
-        self.rounded += u64::from(rounded);
-        self.outline_area_change = self.outline_area_change.max(area_change.abs());
+        self.merge(&MollifiedMembers {
+            members: u64::from(mollified.rounds > 0),
+            most_rounds: mollified.rounds,
+            largest_area_change: mollified.area_change.abs(),
+            unresolved: u64::from(faults.contains(&true)),
+            crossed,
+            sharp,
+            distorted,
+            splines: u64::from(points > 0 && corners == 0),
+            cornered: u64::from(0 < corners && corners < points),
+            polygons: u64::from(points > 0 && corners >= points),
+            rounded: u64::from(rounded),
+            outline_area_change: area_change.abs(),
+        });
     }
 
     /// Adds other members.
     pub(super) fn merge(&mut self, other: &MollifiedMembers) {
-        let MollifiedMembers {
-            members, most_rounds, largest_area_change, unresolved, crossed, sharp, distorted, ..
-        } = other;
-        let MollifiedMembers { splines, cornered, polygons, rounded, outline_area_change, .. } = other;
-        self.splines = self.splines.saturating_add(*splines);
-        self.cornered = self.cornered.saturating_add(*cornered);
-        self.polygons = self.polygons.saturating_add(*polygons);
-        self.rounded = self.rounded.saturating_add(*rounded);
-        self.outline_area_change = self.outline_area_change.max(*outline_area_change);
-        self.members = self.members.saturating_add(*members);
-        self.most_rounds = self.most_rounds.max(*most_rounds);
-        self.largest_area_change = self.largest_area_change.max(*largest_area_change);
-        self.unresolved = self.unresolved.saturating_add(*unresolved);
-        self.crossed = self.crossed.saturating_add(*crossed);
-        self.sharp = self.sharp.saturating_add(*sharp);
-        self.distorted = self.distorted.saturating_add(*distorted);
+        let mut other = *other;
+        for (own, other) in self.counts().into_iter().zip(other.counts()) {
+            *own = own.saturating_add(*other);
+        }
+        self.most_rounds = self.most_rounds.max(other.most_rounds);
+        self.largest_area_change = self.largest_area_change.max(other.largest_area_change);
+        self.outline_area_change = self.outline_area_change.max(other.outline_area_change);
+    }
+
+    fn counts(&mut self) -> [&mut u64; 9] {
+        let MollifiedMembers { members, unresolved, crossed, sharp, distorted, .. } = self;
+        let MollifiedMembers { splines, cornered, polygons, rounded, .. } = self;
+        [members, unresolved, crossed, sharp, distorted, splines, cornered, polygons, rounded]
     }
 
     /// What their outlines were taken as, and how corners were rounded; `None` if there are none.

@@ -26,7 +26,7 @@ const MAX_TITLE: usize = 90;
 impl FinishedRun<'_> {
     /// What the page says first.
     pub fn head(&self) -> PageHead {
-        let smoothing = self.tally.mollified.smoothing().map_or(String::new(), |text| format!(" {text}."));
+        let smoothing = self.tally.supplement.mollified.smoothing().map_or(String::new(), |text| format!(" {text}."));
         PageHead {
             title: self.title(),
             what: format!(

@@ -1,6 +1,6 @@
 //! What the user should know about the results of a run, from its totals.
 
-use super::{CellTally, DISTRUSTED_DRIFT, RELAXED, Tally};
+use super::{CellTally, DISTRUSTED_DRIFT, RELAXED, Tally, TallySupplement};
 use curvelax_base::text::{count, plural, significant};
 use curvelax_ensemble::Status;
 
@@ -10,7 +10,7 @@ const NAMED_CELLS: usize = 5;
 impl Tally {
     /// What the user should know about the results, one sentence each.
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings: Vec<String> = self.mollified.warning(self.members()).into_iter().collect();
+        let mut warnings: Vec<String> = self.supplement.mollified.warning(self.members()).into_iter().collect();
         let members = format!("{} {}", self.members(), plural(self.members(), "member"));
         let failed = self.failed();
         if failed > 0 {
@@ -23,16 +23,16 @@ impl Tally {
         }
         warnings.extend(self.vanished());
         warnings.extend(self.late());
-        if self.below_rounding > 0 {
+        let TallySupplement { drifted: (drifted, worst), below_rounding, .. } = self.supplement;
+        if below_rounding > 0 {
             warnings.push(format!(
-                "{} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
-                 determined; use --precision f64, or a larger --relax-to or --relax-at",
-                self.below_rounding
+                "{below_rounding} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
+                 determined; use --precision f64, or a larger --relax-to or --relax-at"
             ));
         }
         warnings.extend(self.moving());
         warnings.extend(self.without_limits());
-        let judged = || self.cells.iter().flat_map(|cell| &cell.judged);
+        let judged = || self.cells.iter().flat_map(|cell| &cell.relaxing.judged);
         let open = judged().filter(|limit| limit.is_open()).count();
         if self.refined && open > 0 {
             let all = judged().count();
@@ -65,7 +65,6 @@ impl Tally {
                 ));
             }
         }
-        let (drifted, worst) = self.drifted;
         if drifted > 0 {
             warnings.push(format!(
                 "{drifted} of {members} ended with a metric drift above {DISTRUSTED_DRIFT} (worst {worst:.2}): \
@@ -113,7 +112,7 @@ impl Tally {
             let without: u64 = of_event(i).map(|of| of.without_limit).sum();
             (format!("reached the event {name}"), "event_levels.csv", without)
         });
-        let relaxed = self.cells.iter().map(|cell| cell.without_limit).sum();
+        let relaxed = self.cells.iter().map(|cell| cell.relaxing.without_limit).sum();
         let vanished = self.cells.iter().map(|cell| cell.vanishing.without_limit).sum();
         let kinds = [("relaxed", relaxed), ("vanished", vanished)];
         let kinds = kinds.into_iter().map(|(did, without)| (did.to_string(), "levels.csv", without)).chain(named);
@@ -165,6 +164,7 @@ mod tests {
     use super::*;
     use crate::samples::outcome;
     use curvelax_ensemble::{LevelTimes, Outcome, Spec};
+    use curvelax_statistics::Limit;
 
     fn of(spec: &str, members: &[Outcome]) -> Tally {
         let mut tally = Tally::of(&Spec::from_toml(spec).unwrap(), &LevelTimes::default());
@@ -181,7 +181,7 @@ mod tests {
         };
         let vesicles = of("flow = 'willmore'\nconserve = 'area,length'", &own());
         let later_than =
-            |of: &Tally, cell: usize| of.cells[cell].times.iter().map(|seen| seen.time).collect::<Vec<_>>();
+            |of: &Tally, cell: usize| of.cells[cell].relaxing.times.iter().map(|seen| seen.time).collect::<Vec<_>>();
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
         let warning = "2 of 3 members still moved at their final time, or came back near the threshold of the energy: \
@@ -205,8 +205,9 @@ mod tests {
 
     #[test]
     fn times_without_a_limit_are_told_where_limits_were_asked_for() {
-        let relaxed = |t_limit, event, vanished: bool| Outcome {
-            t_limit,
+        let limit = |t| Limit { t, error: 1e-4, fixed: 0.0, order: None, asymptotic: true, relative: 0.0 };
+        let relaxed = |t_limit: Option<f64>, event, vanished: bool| Outcome {
+            judged: t_limit.map(limit),
             events: vec![event],
             t_vanish: vanished.then_some(1.5),
             ..outcome(0, Status::Relaxed, Some(0.5))
