@@ -64,31 +64,23 @@ pub struct Round {
     found: Option<Uncertainty>,
 }
 
-/// Relative half-widths of the intervals of the limits of a cell.
+/// Relative half-width of the interval of the times of a cell, and the part of it that is there without sampling.
 #[derive(Clone, Copy)]
-enum Uncertainty {
-    /// Of each member, or of most.
-    Each(f64),
-    /// Of the median.
-    Median { all: f64, discretisation: f64 },
-    /// Of the median, by sampling.
-    Sampling(f64),
+struct Uncertainty {
+    of: Uncertain,
+    all: f64,
+    discretisation: f64,
 }
 
-impl Uncertainty {
-    fn all(self) -> f64 {
-        match self {
-            Uncertainty::Each(all) | Uncertainty::Median { all, .. } | Uncertainty::Sampling(all) => all,
-        }
-    }
-
-    fn discretisation(self) -> f64 {
-        match self {
-            Uncertainty::Each(all) => all,
-            Uncertainty::Median { discretisation, .. } => discretisation,
-            Uncertainty::Sampling(_) => 0.0,
-        }
-    }
+/// What an interval is that of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Uncertain {
+    /// The limit of each member, or of most.
+    Each,
+    /// The median of the limits.
+    Median,
+    /// The median of the times, by sampling alone.
+    Sampled,
 }
 
 impl fmt::Display for Round {
@@ -96,14 +88,14 @@ impl fmt::Display for Round {
         let Round { number, points, tolerance, found, .. } = self;
         let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {}", rounded(tolerance, 2)));
         write!(f, "round {number}: {} of n = {points}{tolerance}: ", count(self.members, "member"))?;
-        let shown = |value: f64| rounded(value, 2);
-        match *found {
-            None => write!(f, "no interval is known"),
-            Some(Uncertainty::Each(all)) => write!(f, "relative error of each {}", shown(all)),
-            Some(Uncertainty::Median { all, discretisation }) => {
-                write!(f, "relative uncertainty {}, {} of it by discretisation", shown(all), shown(discretisation))
-            }
-            Some(Uncertainty::Sampling(all)) => write!(f, "relative uncertainty {} by sampling", shown(all)),
+        let Some(Uncertainty { of, all, discretisation }) = *found else {
+            return write!(f, "no interval is known");
+        };
+        let (all, discretisation) = (rounded(all, 2), rounded(discretisation, 2));
+        match of {
+            Uncertain::Each => write!(f, "relative error of each {all}"),
+            Uncertain::Median => write!(f, "relative uncertainty {all}, {discretisation} of it by discretisation"),
+            Uncertain::Sampled => write!(f, "relative uncertainty {all} by sampling"),
         }
     }
 }
@@ -155,14 +147,14 @@ impl Search<'_> {
             };
             // Without an interval more nodes do not help, either.
             let Some(found) = found else { return Ok(best.map_or((spec, cells), |(_, spec, cells)| (spec, cells))) };
-            if found.all() <= self.goal {
+            if found.all <= self.goal {
                 return Ok((spec, cells));
             }
-            let (allowed, is_beyond) = match found {
-                Uncertainty::Each(_) => (self.goal, false),
+            let (allowed, is_beyond) = match found.of {
+                Uncertain::Each => (self.goal, false),
                 _ => (DISCRETISATION * self.goal, self.is_beyond(&cells)),
             };
-            let (error, points) = (found.discretisation(), spec.points);
+            let (error, points) = (found.discretisation, spec.points);
             let is_enough = error <= allowed || is_beyond;
             let better = best.as_ref().is_none_or(|(best, ..)| error < *best);
             idle = if best.as_ref().is_none_or(|(best, ..)| error < LEFT * best) { 0 } else { idle + 1 };
@@ -226,9 +218,9 @@ impl Search<'_> {
         let statistics = self.run(&study, Tally::of(study.spec(), &LevelTimes::default()))?.0;
         let cells = statistics.cells.iter().map(|cell| cell.uncertainty(statistics.of_each));
         let farthest = |cells: Vec<(f64, f64)>| cells.into_iter().max_by(|one, other| one.0.total_cmp(&other.0));
-        let found = cells.collect::<Option<Vec<_>>>().and_then(farthest).map(|(all, discretisation)| {
-            if statistics.of_each { Uncertainty::Each(all) } else { Uncertainty::Median { all, discretisation } }
-        });
+        let of = if statistics.of_each { Uncertain::Each } else { Uncertain::Median };
+        let found = cells.collect::<Option<Vec<_>>>().and_then(farthest);
+        let found = found.map(|(all, discretisation)| Uncertainty { of, all, discretisation });
         self.report(spec, &study, found);
         Ok((statistics.cells, found))
     }
@@ -245,8 +237,9 @@ impl Search<'_> {
         let (statistics, tally) = self.run(&study, tally)?;
         *sums = is_alone.then_some((spec.curves, tally));
         let widths: Option<Vec<f64>> = statistics.cells.iter().map(half_width).collect();
-        let found = widths.and_then(|all| all.into_iter().reduce(f64::max)).map(Uncertainty::Sampling);
-        self.report(spec, &study, found);
+        let widest = widths.and_then(|all| all.into_iter().reduce(f64::max));
+        let found = |all| Uncertainty { of: Uncertain::Sampled, all, discretisation: 0.0 };
+        self.report(spec, &study, widest.map(found));
         Ok(statistics.cells)
     }
 
@@ -291,8 +284,8 @@ fn quiet(spec: &Spec, refined: bool) -> Result<Study> {
 
 /// Half-width of the interval of the median time of a cell, relative to it.
 fn half_width(cell: &CellStatistics) -> Option<f64> {
-    let (median, (low, high)) = (cell.median()?, cell.interval()?.bounds()?);
-    Some((high - median).max(median - low) / median).filter(|width| width.is_finite())
+    let times = &cell.relaxing.times;
+    times.half_width(times.interval()?.bounds()?).filter(|width| width.is_finite())
 }
 
 /// The spec with more nodes and shorter steps, so that an error that is so many times as large as `allowed` comes down

@@ -170,15 +170,10 @@ fn gpu(spec: &Spec) -> Result<ChosenBackend> {
     }
     let found = Gpu::list();
     let names: Vec<String> = found.iter().map(|gpu| gpu.name().to_string()).collect();
-    let (mut chosen, by_number) = Gpu::select(found, spec.adapter.as_deref());
-    match chosen.is_empty() {
-        false => {
-            let adapter = chosen.swap_remove(0);
-            let number = by_number.then(|| spec.adapter.clone()).flatten();
-            Ok(ChosenBackend { number, ..take(spec, adapter, "asked for".into())? })
-        }
-        true => Err(no_adapter(spec.adapter.as_deref(), &names)),
-    }
+    let (chosen, by_number) = Gpu::select(found, spec.adapter.as_deref());
+    let adapter = chosen.into_iter().next().ok_or_else(|| no_adapter(spec.adapter.as_deref(), &names))?;
+    let number = by_number.then(|| spec.adapter.clone()).flatten();
+    Ok(ChosenBackend { number, ..take(spec, adapter, "asked for".into())? })
 }
 
 /// Why there is no adapter, and what to do.
@@ -315,24 +310,16 @@ impl ChosenBackend {
 
     /// Returns where this choice computes the members of `spec`.
     pub fn platform(&self, spec: &Spec) -> Platform {
-        let mut platform = Platform {
+        let gpu = self.device.gpu();
+        Platform {
             backend: self.device.kind(),
-            adapter: None,
-            driver: None,
-            device_type: None,
+            adapter: gpu.map(|gpu| gpu.name().to_string()),
+            driver: gpu.map(|gpu| gpu.driver()),
+            device_type: gpu.map(|gpu| gpu.device_type()),
             precision: self.precision,
             reason: self.reason.clone(),
-            threads: None,
-        };
-        match &self.device {
-            Device::Gpu(gpu) => {
-                platform.adapter = Some(gpu.name().to_string());
-                platform.driver = Some(gpu.driver());
-                platform.device_type = Some(gpu.device_type());
-            }
-            Device::Cpu => platform.threads = Some(threads(spec)),
+            threads: gpu.is_none().then(|| threads(spec)),
         }
-        platform
     }
 
     /// Returns the choice for a later part of a study whose first part runs `there`, since a study does not change

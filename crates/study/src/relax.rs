@@ -26,24 +26,22 @@ use curvelax_ensemble::{LevelSink, LevelTimes, Sink, Study, simulate::simulate};
 /// [`Error::Request`](curvelax_base::error::Error::Request) if this machine cannot do what the spec asks for,
 /// [`Error::Device`](curvelax_base::error::Error::Device) if a requested GPU fails, and the errors of the sink.
 pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
-    let (stages, mut choices) = (study.stages(), choose_all(study)?);
+    let (stages, choices) = (study.stages(), choose_all(study)?);
     let own = study.own_stage();
     // Where it is computed depends on whether this device can be opened.
-    let first = choices.remove(own);
-    let (first, platform) = first.open_for(&study.cells()[stages[own].range.clone()])?;
+    let (first, platform) = choices[own].open_for(&study.cells()[stages[own].range.clone()])?;
     let (mut first, mut levels) = (Some(first), LevelTimes::default());
-    for (i, stage) in stages.iter().enumerate() {
+    for (i, (stage, choice)) in stages.iter().zip(choices).enumerate() {
         let cells = study.cells_of(stage, &levels)?;
         // No member needs these nodes.
         if cells.is_empty() {
-            choices.remove(0);
             continue;
         }
         let (mut backend, precision) = match first.take_if(|_| i == own) {
             Some(first) => (first, platform.precision),
             None => {
                 // A study does not change device midway.
-                let choice = choices.remove(0).after(&platform);
+                let choice = choice.after(&platform);
                 (choice.open_for(&cells)?.0, choice.precision())
             }
         };

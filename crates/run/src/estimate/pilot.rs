@@ -358,7 +358,8 @@ pub fn sample(
         series: per_member(|seen| seen.series as f64).unwrap_or(most_series) * all as f64,
         nodes: per_member(|seen| seen.snapshots as f64).unwrap_or(most_snapshots) * all as f64 * points(cohort) as f64,
     };
-    let rows = per_member(|seen| seen.rows).unwrap_or_else(|| all_rows(cohort));
+    let most = rows::bytes_of(most_series as usize, most_snapshots as usize, points(cohort));
+    let rows = per_member(|seen| seen.rows).unwrap_or(most as f64);
     let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
     let reads_back = cohort.iter().any(|cell| !cell.spec.snapshots.is_empty()) && share > 0.0;
     Ok(CohortSample { work, pilots, rows: [rows, share * rows], reads_back })
@@ -396,13 +397,6 @@ fn pilot(
     }
     (seen.counts.seconds, seen.work, seen.dispatches) = (started.elapsed().as_secs_f64(), work, dispatches);
     Ok((end, seen))
-}
-
-/// Bytes of the rows of a member that reaches the final time, the maximum over all cells.
-fn all_rows(cohort: &[Cell]) -> f64 {
-    let of_cell =
-        |cell: &Cell| rows::bytes_of(series_of(cell) as usize, cell.spec.snapshots.len(), cell.family.points()) as f64;
-    cohort.iter().map(of_cell).fold(0.0, f64::max)
 }
 
 /// Rows of the series and snapshots of a member that reaches the final time, the maximum over all cells.

@@ -207,10 +207,10 @@ impl<'a> CellDocument<'a> {
             values: spec.sweep.axes().iter().map(|axis| &axis.key[..]).zip(spec.sweep.values(cell)).collect(),
             members: statistics.members(),
             members_by_status: Status::ALL.iter().map(|status| status.name()).zip(counts).collect(),
-            t_relax: statistics.times.numbers(),
+            t_relax: statistics.relaxing.times.numbers(),
             rate: statistics.rates.numbers.clone(),
-            discretisation: statistics.errors(),
-            t_limit: statistics.limit(),
+            discretisation: statistics.relaxing.errors(),
+            t_limit: statistics.relaxing.limit(),
             t_vanish: statistics.vanished(),
             t_vanish_limit: statistics.vanished_limit(),
             events: spec.event.iter().map(|event| &event.name[..]).zip(events).collect(),
@@ -257,9 +257,9 @@ mod tests {
         assert_eq!((&cell["members_by_status"]["stalled"], &cell["t_relax"]["known"]), (&1.into(), &2.into()));
         for (cell, statistics) in json["cells"].as_array().unwrap().iter().zip(&statistics.cells) {
             let read = |name: &str| cell["t_relax"][name].as_f64();
-            assert_eq!(read("median"), statistics.median());
-            assert_eq!(read("mean"), statistics.times.mean.map(|mean| mean.value));
-            assert_eq!(read("se"), statistics.times.mean.and_then(|mean| mean.standard_error));
+            assert_eq!(read("median"), statistics.relaxing.times.median());
+            assert_eq!(read("mean"), statistics.relaxing.times.mean.map(|mean| mean.value));
+            assert_eq!(read("se"), statistics.relaxing.times.mean.and_then(|mean| mean.standard_error));
             assert_eq!(read("q95"), None, "a quantile beyond the last event is unknown: {text}");
         }
         assert_eq!(json["log_rank"], serde_json::Value::Null);
@@ -270,7 +270,7 @@ mod tests {
         let open = statistics
             .cells
             .iter()
-            .filter(|cell| cell.interval().is_none_or(|interval| interval.bounds().is_none()))
+            .filter(|cell| cell.relaxing.times.interval().is_none_or(|interval| interval.bounds().is_none()))
             .count();
         assert!(open > 0 && law["left_out"].as_array().unwrap().len() == open, "{text}");
         assert_eq!(law["left_out"][0]["reason"], "its median has no closed interval");

@@ -116,7 +116,7 @@ impl Overview<'_> {
 
     /// The times of a cell of which limits are shown, if they are.
     fn limits_of<'b>(&self, cell: &'b CellStatistics) -> Option<&'b TimeStatistics> {
-        Some(&cell.times).filter(|_| self.statistics.of_limits)
+        Some(&cell.relaxing.times).filter(|_| self.statistics.of_limits)
     }
 
     /// When the members of a single ensemble vanished, if any did.
@@ -127,7 +127,7 @@ impl Overview<'_> {
     /// What stands behind the limits of a single ensemble.
     fn raw(&self) -> String {
         let cell = self.only_cell().filter(|_| self.statistics.of_limits);
-        cell.map_or(String::new(), |cell| raw(&cell.times, self.spec))
+        cell.map_or(String::new(), |cell| raw(&cell.relaxing.times, self.spec))
     }
 
     /// A line for each event of a single ensemble.
@@ -200,8 +200,8 @@ impl Overview<'_> {
             let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
             let of_cell = times(self.statistics.times(cell), self.limits_of(cell), "relaxed");
             writeln!(f, "{:<11}{name}: {time} {}{of_cell}", format!("cell {}", cell.cell), unit(self.spec))?;
-            if self.statistics.of_limits && cell.times.mean.is_some() {
-                writeln!(f, "{:<11}t_relax {}", "", raw(&cell.times, self.spec))?;
+            if self.statistics.of_limits && cell.relaxing.times.mean.is_some() {
+                writeln!(f, "{:<11}t_relax {}", "", raw(&cell.relaxing.times, self.spec))?;
             }
             let errors = errors(cell, self.spec);
             if !errors.is_empty() {
@@ -380,8 +380,8 @@ results    out: summary.csv, run.json
 
     #[test]
     fn members_that_needed_more_nodes_are_counted() {
-        let mut tally = Tally::default();
-        tally.refined = true;
+        let spec = Spec { refine: true, ..Spec::default() };
+        let mut tally = Tally::of(&spec, &curvelax_ensemble::LevelTimes::default());
         let nodes = |tally: &Tally| {
             let text = overview(tally);
             text.lines().find_map(|line| line.strip_prefix("nodes      ").map(String::from))

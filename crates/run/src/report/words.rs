@@ -242,24 +242,25 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
 
 /// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
 pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
-    if cell.times.sample.events() == 0 {
+    let EventStatistics { times, discretisation, limits, .. } = &cell.relaxing;
+    if times.sample.events() == 0 {
         return String::new();
     }
-    let bounds = cell.interval().and_then(|interval| interval.bounds());
+    let bounds = times.interval().and_then(|interval| interval.bounds());
     // The interval of the limits says it already, together with what follows.
-    let sampling = bounds.filter(|_| cell.limits.is_none());
-    let half = bounds.zip(cell.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let sampling = bounds.filter(|_| limits.is_none());
+    let half = bounds.zip(times.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
     // Members that start at rest have none.
     let half = half.filter(|half| half.is_finite());
     let sampling = match sampling.and(half) {
         Some(half) => format!("sampling ±{} %; ", rounded(100.0 * half, 2)),
-        None if bounds.is_none() && cell.limits.is_none() && cell.times.sample.len() > 1 => {
+        None if bounds.is_none() && limits.is_none() && times.sample.len() > 1 => {
             "sampling not known: too few members relaxed; ".into()
         }
         None => String::new(),
     };
-    let Some(discretisation) = &cell.discretisation else {
-        if cell.limits.is_some() {
+    let Some(discretisation) = discretisation else {
+        if limits.is_some() {
             return String::new();
         }
         return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
@@ -267,7 +268,7 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
     let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
-    let bound = cell.limits.as_ref().and_then(|limits| limits.error);
+    let bound = limits.as_ref().and_then(|limits| limits.error);
     if let (false, Some(bound)) = (discretisation.converges(), bound) {
         return format!(
             "{sampling}t_error {} (median), a bound: times of {not_asymptotic} of {members} {known} do not converge yet in n",

@@ -27,21 +27,17 @@ pub struct CellStatistics {
     pub values: Vec<String>,
     /// Members, by status.
     pub counts: [u64; Status::ALL.len()],
-    /// The relaxation times.
-    pub times: TimeStatistics,
+    /// When members relaxed.
+    pub relaxing: EventStatistics,
     /// Decay rates.
     pub rates: Rates,
-    /// The error of discretisation, if it is known of some members.
-    pub discretisation: Option<DiscretisationError>,
-    /// The limits, if members have them.
-    pub limits: Option<CellLimits>,
     /// The events of the spec, in their order.
     pub events: Vec<EventStatistics>,
     /// When members vanished, if they are driven.
     pub vanishing: EventStatistics,
 }
 
-/// An event in one cell.
+/// A kind of time in one cell: that of relaxation, of an event, or of vanishing.
 pub struct EventStatistics {
     /// Its times.
     pub times: TimeStatistics,
@@ -153,23 +149,12 @@ impl CellStatistics {
         let events = spec.event.iter().map(|_| EventStatistics::new(of_events.next().unwrap_or_default(), copies));
         let events = events.collect::<Result<_>>()?;
         let vanishing = EventStatistics::new(mem::take(&mut tally.vanishing), copies)?;
-        let EventStatistics { times, discretisation, limits, .. } = relaxing;
-        Ok(CellStatistics { cell, values, counts, times, rates, discretisation, limits, events, vanishing })
+        Ok(CellStatistics { cell, values, counts, relaxing, rates, events, vanishing })
     }
 
     /// Number of members that ended.
     pub fn members(&self) -> u64 {
         self.counts.iter().sum()
-    }
-
-    /// The numbers on the error of discretisation, for the table.
-    pub fn errors(&self) -> Numbers {
-        errors(self.discretisation.as_ref(), OF_T_RELAX)
-    }
-
-    /// The numbers on the limits, for the table.
-    pub fn limit(&self) -> Numbers {
-        limit(self.limits.as_ref())
     }
 
     /// The numbers on the times at which members vanished, for the table.
@@ -193,10 +178,10 @@ impl CellStatistics {
     /// The row of a table, with `keys` after the index of the cell.
     fn row(&self, keys: impl Iterator<Item = StatisticsField>) -> Vec<StatisticsField> {
         let quantities = [
-            ("t_relax", self.times.numbers()),
+            ("t_relax", self.relaxing.times.numbers()),
             ("rate", self.rates.numbers.clone()),
-            ("discretisation", self.errors()),
-            ("t_limit", self.limit()),
+            ("discretisation", self.relaxing.errors()),
+            ("t_limit", self.relaxing.limit()),
         ];
         let vanishing = [("t_vanish", self.vanished()), ("t_vanish_limit", self.vanished_limit())];
         let mut row = vec![count("cell", self.cell, "index of the cell, from 0")];
@@ -217,12 +202,7 @@ impl CellStatistics {
 
     /// The times that are shown: the limits, if they are asked for.
     pub fn judged(&self, of_limits: bool) -> &TimeStatistics {
-        self.limits.as_ref().filter(|_| of_limits).map_or(&self.times, |limits| &limits.times)
-    }
-
-    /// Time by which half of the members have relaxed.
-    pub fn median(&self) -> Option<f64> {
-        self.times.median()
+        if of_limits { self.relaxing.judged() } else { &self.relaxing.times }
     }
 
     /// The median with its interval, that of the limits if they are asked for.
@@ -233,18 +213,13 @@ impl CellStatistics {
 
     /// Whether all its members relaxed at one time, as copies of one curve do.
     pub fn has_copies(&self) -> bool {
-        let mut seen = self.times.sample.observations();
+        let mut seen = self.relaxing.times.sample.observations();
         seen.next().is_some_and(|first| first.happened && seen.all(|other| other == first))
-    }
-
-    /// The interval of the median.
-    pub fn interval(&self) -> Option<Interval> {
-        self.times.interval()
     }
 
     /// The relative uncertainty of its limits: of each, or else of their median, with the part that is no sampling.
     pub fn uncertainty(&self, of_each: bool) -> Option<(f64, f64)> {
-        let limits = self.limits.as_ref()?;
+        let limits = self.relaxing.limits.as_ref()?;
         if of_each { limits.widest.map(|widest| (widest, widest)) } else { limits.uncertainty() }
     }
 }
@@ -263,55 +238,42 @@ impl EventStatistics {
 
     /// The numbers on its error of discretisation, for the table.
     pub fn errors(&self) -> Numbers {
-        errors(self.discretisation.as_ref(), OF_EVENT)
+        let number = |number: fn(&DiscretisationError) -> f64| self.discretisation.as_ref().map(number);
+        let mean = "relative error of the time that n and the steps leave, negative if it is too early: mean of these";
+        let named = vec![
+            Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
+            Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
+        ];
+        let known = self.discretisation.as_ref().map_or(0, |of| of.members);
+        Numbers { known, named, intervals: Vec::new() }
     }
 
     /// The numbers on its limits, for the table.
     pub fn limit(&self) -> Numbers {
-        limit(self.limits.as_ref())
+        let times = self.limits.as_ref().map(|limits| &limits.times);
+        let error = self.limits.as_ref().and_then(|limits| limits.error);
+        let of = |number: fn(Mean) -> Option<f64>| times.and_then(|times| times.mean).and_then(number);
+        let interval = times.and_then(TimeStatistics::interval);
+        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than \
+                   6 that of their range; empty if there is none";
+        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer \
+                    than 6 that of their range; empty if there is none";
+        let named = vec![
+            Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
+            Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
+            Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
+            Statistic { name: "median", value: times.and_then(TimeStatistics::median), meaning: "median" },
+            Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
+            Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
+            Statistic { name: "error", value: error, meaning: "median of t_error" },
+        ];
+        Numbers { known: times.map_or(0, |times| times.sample.events()), named, intervals: vec![covered(interval)] }
     }
 
     /// The times that are shown: the limits, if there are any.
     pub fn judged(&self) -> &TimeStatistics {
         self.limits.as_ref().map_or(&self.times, |limits| &limits.times)
     }
-}
-
-/// The numbers on limits, for the table.
-fn limit(limits: Option<&CellLimits>) -> Numbers {
-    let times = limits.map(|limits| &limits.times);
-    let of = |number: fn(Mean) -> Option<f64>| times.and_then(|times| times.mean).and_then(number);
-    let interval = times.and_then(TimeStatistics::interval);
-    let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
-               that of their range; empty if there is none";
-    let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer than 6 \
-                that of their range; empty if there is none";
-    let named = vec![
-        Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
-        Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
-        Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
-        Statistic { name: "median", value: times.and_then(TimeStatistics::median), meaning: "median" },
-        Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
-        Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
-        Statistic { name: "error", value: limits.and_then(|limits| limits.error), meaning: "median of t_error" },
-    ];
-    Numbers { known: times.map_or(0, |times| times.sample.events()), named, intervals: vec![covered(interval)] }
-}
-
-/// What the mean error of discretisation of a time means.
-const OF_T_RELAX: &str =
-    "relative error of t_relax that n and the steps leave, negative if it is too early: mean of these";
-const OF_EVENT: &str =
-    "relative error of the time that n and the steps leave, negative if it is too early: mean of these";
-
-/// The numbers on an error of discretisation.
-fn errors(of: Option<&DiscretisationError>, mean: &'static str) -> Numbers {
-    let number = |number: fn(&DiscretisationError) -> f64| of.map(number);
-    let named = vec![
-        Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
-        Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
-    ];
-    Numbers { known: of.map_or(0, |of| of.members), named, intervals: Vec::new() }
 }
 
 impl EnsembleStatistics {

@@ -99,9 +99,8 @@ impl CellLimits {
 
     /// Half-width of the interval of the median relative to it, and the part of it that is there without sampling.
     pub fn uncertainty(&self) -> Option<(f64, f64)> {
-        let median = self.times.median().filter(|median| *median > 0.0)?;
-        let half = |(low, high): (f64, f64)| (high - median).max(median - low) / median;
-        Some((half(self.times.interval()?.bounds()?), half(self.ends?)))
+        self.times.median().filter(|median| *median > 0.0)?;
+        Some((self.times.half_width(self.times.interval()?.bounds()?)?, self.times.half_width(self.ends?)?))
     }
 }
 

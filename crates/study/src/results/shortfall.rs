@@ -47,13 +47,13 @@ impl Shortfall {
 fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
     let points = spec.points;
     match cell.uncertainty(of_each) {
-        _ if cell.median() == Some(0.0) => {
+        _ if cell.relaxing.times.median() == Some(0.0) => {
             "at least half of the members are relaxed at the start: use a larger --amplitude, or another --shape".into()
         }
         None => format!(
             "{} of {} have a limit, too few for a median with an interval: use more --curves or a longer --t-end, or a \
              curve that relaxes",
-            cell.limits.as_ref().map_or(0, |limits| limits.times.sample.events()),
+            cell.relaxing.limits.as_ref().map_or(0, |limits| limits.times.sample.events()),
             count(cell.members(), "member")
         ),
         Some((all, _)) if of_each && 2.0 * rounding(cell) > all => format!(
@@ -83,13 +83,13 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
 
 /// The part of the widest errors of its members that the rounding of corners has, relative to their limits.
 fn rounding(cell: &CellStatistics) -> f64 {
-    cell.limits.as_ref().and_then(|limits| limits.fixed).unwrap_or_default()
+    cell.relaxing.limits.as_ref().and_then(|limits| limits.fixed).unwrap_or_default()
 }
 
 /// Members for which the interval of the median time would be within `sampling` times the median: the share of the
 /// members per time near the median gives its width. None if it is not known.
 pub fn needed(cell: &CellStatistics, sampling: f64) -> Option<f64> {
-    let [low, median, high] = [0.5 - NEAR, 0.5, 0.5 + NEAR].map(|share| cell.times.survival().quantile(share));
+    let [low, median, high] = [0.5 - NEAR, 0.5, 0.5 + NEAR].map(|share| cell.relaxing.times.survival().quantile(share));
     let spread = (high? - low?) / (2.0 * NEAR);
     Some((HALF_WIDTH * spread / (median? * sampling)).powi(2).ceil())
         .filter(|members| sampling > 0.0 && members.is_finite())

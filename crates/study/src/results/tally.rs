@@ -37,12 +37,8 @@ pub struct Tally {
     pub events: Vec<String>,
     /// For each of them, the members in which it holds from the start.
     pub at_start: Vec<u64>,
-    /// Whether members are to have limits.
-    pub refined: bool,
-    /// Whether members end when they are relaxed.
-    pub stops: bool,
-    /// Whether a driving force may make members vanish.
-    pub driven: bool,
+    /// How members are counted.
+    counted: Counted,
     /// By cell: whether its members are vesicles; empty if none are.
     vesicles: Vec<bool>,
     /// What helps those that failed.
@@ -180,11 +176,15 @@ pub struct EventTally {
 }
 
 /// What decides on how members are counted.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Counted {
+    /// Whether members are to have limits.
     refined: bool,
+    /// Whether members end when they are relaxed.
     stops: bool,
+    /// Whether a driving force may make members vanish.
     driven: bool,
+    /// Whether these members keep area and length.
     vesicles: bool,
 }
 
@@ -304,16 +304,16 @@ impl Tally {
     pub fn of(spec: &Spec, levels: &LevelTimes) -> Tally {
         let events: Vec<String> = spec.event.iter().map(|event| event.name.clone()).collect();
         let at_start = vec![0; events.len()];
-        let stops = spec.stops_when_relaxed();
-        let driven = spec.drive.is_some() || spec.sweep.has("drive");
         let sweep = spec.sweep.clone();
         let vesicles = (0..sweep.cells()).take_while(|_| spec.keeps_both()).map(|cell| spec.has_vesicles_in(cell));
-        let has_outlines = spec.rounding.is_some() || spec.sweep.has("rounding");
         Tally {
-            has_outlines,
-            refined: spec.refine,
-            stops,
-            driven,
+            has_outlines: spec.rounding.is_some() || sweep.has("rounding"),
+            counted: Counted {
+                refined: spec.refine,
+                stops: spec.stops_when_relaxed(),
+                driven: spec.drive.is_some() || sweep.has("drive"),
+                vesicles: false,
+            },
             vesicles: vesicles.collect(),
             remedies: Remedies::of(spec),
             sweep,
@@ -334,9 +334,8 @@ impl Tally {
     /// # Errors
     /// For an invalid time.
     pub fn add(&mut self, outcome: &Outcome) -> Result<()> {
-        let (cell, refined) = (outcome.cell as usize, self.refined);
-        let vesicles = self.is_vesicle(cell as u64);
-        let counted = Counted { refined, stops: self.stops, driven: self.driven, vesicles };
+        let cell = outcome.cell as usize;
+        let counted = Counted { vesicles: self.is_vesicle(outcome.cell), ..self.counted };
         if self.cells.len() <= cell {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
@@ -347,7 +346,7 @@ impl Tally {
         if !outcome.group.is_empty() {
             self.groups.entry((outcome.cell, outcome.group.clone())).or_default().add(outcome, counted)?;
         }
-        if refined {
+        if counted.refined {
             self.nodes.add(outcome);
         }
         self.at_start.iter_mut().zip(&outcome.events).for_each(|(count, t)| *count += u64::from(*t == Some(0.0)));

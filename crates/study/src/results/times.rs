@@ -97,6 +97,11 @@ impl TimeStatistics {
         median
     }
 
+    /// The larger distance of these two times from the median, relative to it.
+    pub fn half_width(&self, (low, high): (f64, f64)) -> Option<f64> {
+        self.median().map(|median| (high - median).max(median - low) / median)
+    }
+
     /// The interval of the median.
     pub fn interval(&self) -> Option<Interval> {
         let [_, _, median, ..] = self.intervals;

@@ -136,10 +136,7 @@ fn order(coarse: &RefereeRow, fine: &RefereeRow) -> Option<f64> {
 /// # Errors
 /// Those of [`Study::new`], of the back end, and of `tell`.
 pub fn limits(spec: &Spec, mut tell: impl FnMut(&[RefereeRow]) -> Result<()>) -> Result<()> {
-    let all: Vec<u64> = match &spec.only {
-        Some(only) => only.clone(),
-        None => (0..spec.curves).collect(),
-    };
+    let all: Vec<u64> = spec.members().collect();
     for some in all.chunks(BATCH) {
         let study = Study::new(Spec { refine: true, only: Some(some.to_vec()), ..spec.clone() })?;
         let truth = |i: u32| relaxation_truth(&study.cells()[0], some[i as usize]).map_err(|error| error.to_string());

@@ -109,7 +109,7 @@ impl FinishedRun<'_> {
         if self.statistics.of_limits {
             return String::new();
         }
-        let errors = self.statistics.cells.iter().filter_map(|cell| cell.discretisation.as_ref());
+        let errors = self.statistics.cells.iter().filter_map(|cell| cell.relaxing.discretisation.as_ref());
         let percent: Vec<f64> = errors.filter(|error| error.converges()).map(|error| 100.0 * error.mean).collect();
         let [low, high] = [f64::min, f64::max].map(|of| percent.iter().copied().reduce(of).unwrap_or_default());
         let [low, high] = [low, high].map(|value| significant(value, 2));
@@ -179,7 +179,7 @@ impl FinishedRun<'_> {
         }
         let error = times.mean.and_then(|mean| mean.standard_error);
         let note = match times.mean.and_then(|mean| mean.restricted_to) {
-            Some(_) if cell.limits.is_some() => {
+            Some(_) if cell.relaxing.limits.is_some() => {
                 "a lower bound: some members had not relaxed at the end, or have no limit".into()
             }
             Some(_) => "a lower bound: some members had not relaxed at the end".into(),
@@ -201,16 +201,20 @@ impl FinishedRun<'_> {
     /// What stands behind the limits of a cell.
     fn behind(&self, cell: &CellStatistics) -> Vec<Headline> {
         let (unit, open) =
-            (time_unit(self.spec()), cell.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
+            (time_unit(self.spec()), cell.relaxing.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
         let bound = match open {
             0 => "half-width of the 95 % interval of each t_limit".into(),
             _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
         };
         let shown = |value: f64, digits: usize| format!("{}{unit}", significant(value, digits));
-        let error = cell.limits.as_ref().and_then(|limits| limits.error);
+        let error = cell.relaxing.limits.as_ref().and_then(|limits| limits.error);
         let error = error.map(|error| Headline::new("median t_error", shown(error, 2), bound));
         let nodes = format!("at n = {}", self.spec().points);
-        let raw = cell.median().map(|median| Headline::new("raw median t_relax", shown(median, DIGITS), nodes));
+        let raw = cell
+            .relaxing
+            .times
+            .median()
+            .map(|median| Headline::new("raw median t_relax", shown(median, DIGITS), nodes));
         error.into_iter().chain(raw).collect()
     }
 }
@@ -222,7 +226,7 @@ fn listed(keys: &str) -> String {
 
 /// The error of discretisation of times without limits.
 fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
-    let Some(discretisation) = &cell.discretisation else { return Vec::new() };
+    let Some(discretisation) = &cell.relaxing.discretisation else { return Vec::new() };
     let DiscretisationError { members, mean, error, .. } = discretisation;
     let [mean, error] = [mean, error].map(|value| significant(100.0 * value, 2));
     let known = count(*members as u64, "member");

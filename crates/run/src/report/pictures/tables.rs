@@ -216,10 +216,10 @@ impl FinishedRun<'_> {
             let start = [cell.cell.to_string()].into_iter().chain(values.iter().cloned());
             let rates = ["median", "ratio"].map(|name| cell.rates.numbers.get(name));
             let of_limits = self.statistics.of_limits;
-            let error = cell.discretisation.as_ref().filter(|error| error.converges() && !of_limits);
+            let error = cell.relaxing.discretisation.as_ref().filter(|error| error.converges() && !of_limits);
             let percent = error.map(|error| 100.0 * error.mean);
-            let limits = cell.limits.as_ref().filter(|_| of_limits);
-            let raw = limits.and_then(|_| cell.median());
+            let limits = cell.relaxing.limits.as_ref().filter(|_| of_limits);
+            let raw = limits.and_then(|_| cell.relaxing.times.median());
             let vanishing = &cell.vanishing;
             let gone = [vanishing.times.median(), vanishing.limits.as_ref().and_then(|of| of.times.median())];
             let errors = [percent, limits.and_then(|limits| limits.error), raw];

@@ -34,7 +34,7 @@ impl Tally {
         warnings.extend(self.without_limits());
         let judged = || self.cells.iter().flat_map(|cell| &cell.relaxing.judged);
         let open = judged().filter(|limit| limit.is_open()).count();
-        if self.refined && open > 0 {
+        if self.counted.refined && open > 0 {
             let all = judged().count();
             warnings.push(format!(
                 "t_limit of {open} of {all} {} goes by a single term of the error, and t_error is a wide bound: their times do \
