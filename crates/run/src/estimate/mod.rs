@@ -91,7 +91,7 @@ impl Estimate {
         let until = Instant::now() + PATIENCE;
         let (mut opened, mut start_up, mut pilot) = (None, 0.0, Pilot::default());
         let (mut residents, mut in_pilots, mut held_rows): (Vec<Residents>, u64, bool) = (Vec::new(), 0, false);
-        let (mut own, mut levels, mut finer) = (CohortWork::none(), CohortWork::none(), FinerPilot::default());
+        let (mut own, mut levels, mut finer) = (Vec::new(), Vec::new(), FinerPilot::default());
         let (finest, mut at_finest) = (finest(study), None);
         let wanted = |i: &usize| chosen.contains(i) || finest == Some(*i);
         for (i, choice) in choices.into_iter().enumerate().filter(|(i, _)| wanted(i)) {
@@ -129,22 +129,24 @@ impl Estimate {
             let other = reads_back || platform.backend != DeviceKind::Cpu;
             held_rows |= in_pilot.rows() > size::MANY_ROWS && !other;
             if let Some(level) = stage.level {
-                levels.add(&work);
+                levels.push(work);
                 pilots.first().into_iter().for_each(|seen| finer.add(level, &cells[0].spec, precision, seen));
                 continue;
             }
             opened = Some(platform);
             residents.push(of(stage.members, each));
             pilots.iter().for_each(|seen| pilot.add(&seen.counts));
-            own.add(&work);
+            own.push(work);
         }
         let platform = opened.ok_or_else(|| Error::Failed("a study has no cell".into()))?;
         // Stages without a pilot are assumed to be like those with one.
         let level_members = study.work() - members;
-        let [scale, scale_levels] = [(members, &own), (level_members, &levels)].map(|(all, work)| match work.members {
-            0.0 => 0.0,
-            seen => all as f64 / seen,
-        });
+        let total = |works: &[CohortWork], of: fn(&CohortWork) -> f64| works.iter().map(of).sum::<f64>();
+        let [scale, scale_levels] =
+            [(members, &own), (level_members, &levels)].map(|(all, works)| match total(works, |work| work.members) {
+                0.0 => 0.0,
+                seen => all as f64 / seen,
+            });
         let certain = stages.iter().filter(|stage| !stage.is_selective()).count();
         start_up *= certain as f64 / chosen.len() as f64;
         let share = finer.share(study).filter(|_| certain < stages.len());
@@ -153,8 +155,10 @@ impl Estimate {
         let growth = LevelGrowth::of(study.spec());
         // A member of a level of which nothing is known costs what an own one does.
         let sum = |of: fn(&CohortWork) -> Option<f64>| {
-            let all = scale * of(&own)?;
-            let at_levels = of(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work);
+            let known = |works: &[CohortWork]| works.iter().map(of).sum::<Option<f64>>();
+            let all = scale * known(&own)?;
+            let at_levels =
+                known(&levels).map_or(all * level_members as f64 / members as f64, |work| scale_levels * work);
             let of_level = at_levels / level_members.max(1) as f64;
             let more = finer_members.map_or(0.0, |finer| growth.work(finer, of_level));
             Some(all + at_levels + more + growth.varied_work(varied, share.map_or(0.0, |[share, _]| share), of_level))
@@ -177,12 +181,14 @@ impl Estimate {
             let most = share.map_or(members as f64, |[_, most]| (most * members as f64).ceil());
             residents.push(Residents { n, slots, count: slots.min(most as usize), rows: 0.0, chunks: 0 });
         }
+        let [series, nodes] = [total(&own, |work| work.series), total(&own, |work| work.nodes)];
+        let steps = own.iter().map(|work| work.steps).sum::<Option<f64>>();
         let memory =
             size::memory(size::program(in_pilots, held_rows), members, rated, most, explained, &residents, kept);
         Ok(Estimate {
             members,
             cells: cells.len(),
-            disk_bytes: size::disk(cells, members, rated, scale * own.series, scale * own.nodes) + level_rows as u64,
+            disk_bytes: size::disk(cells, members, rated, scale * series, scale * nodes) + level_rows as u64,
             memory_bytes: memory
                 + level_members * size_of::<(u64, f64)>() as u64
                 + events * (members + level_members) * size_of::<f64>() as u64,
@@ -192,7 +198,7 @@ impl Estimate {
             finer_members: finer_members.map(|finer| finer.ceil() as u64),
             varied_members: varied.ceil() as u64,
             most_points,
-            steps_per_member: own.steps.map(|steps| steps / own.members.max(1.0)),
+            steps_per_member: steps.map(|steps| steps / total(&own, |work| work.members).max(1.0)),
             dispatches: sum(|work| work.dispatches).map(|dispatches| dispatches.ceil() as u64),
             start_up_seconds: start_up,
             seconds,

@@ -42,8 +42,8 @@ pub struct Limits<'a> {
     pub stopped: &'a dyn Fn() -> Option<Error>,
 }
 
-/// The cost of some cohorts, and for how many members a pilot stands.
-#[derive(Debug, Default)]
+/// The cost of a cohort, and for how many members its pilot stands.
+#[derive(Debug)]
 pub struct CohortWork {
     pub members: f64,
     pub seconds: Option<f64>,
@@ -52,22 +52,6 @@ pub struct CohortWork {
     /// Rows of the series, and nodes of the snapshots.
     pub series: f64,
     pub nodes: f64,
-}
-
-impl CohortWork {
-    pub fn none() -> CohortWork {
-        CohortWork { seconds: Some(0.0), dispatches: Some(0.0), steps: Some(0.0), ..CohortWork::default() }
-    }
-
-    pub fn add(&mut self, other: &CohortWork) {
-        let add = |sum: Option<f64>, part: Option<f64>| Some(sum? + part?);
-        self.members += other.members;
-        self.series += other.series;
-        self.nodes += other.nodes;
-        self.seconds = add(self.seconds, other.seconds);
-        self.dispatches = add(self.dispatches, other.dispatches);
-        self.steps = add(self.steps, other.steps);
-    }
 }
 
 /// The pilots of all cohorts together.

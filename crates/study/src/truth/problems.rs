@@ -117,14 +117,6 @@ pub struct ErrorBound {
     pub single: f64,
 }
 
-impl ErrorBound {
-    /// Returns the bound at n nodes after `steps` steps.
-    fn at(&self, n: usize, steps: f64, precision: Precision) -> f64 {
-        let rounding = if precision == Precision::F32 { self.single } else { 1e-9 };
-        self.space * (100.0 / n as f64).powi(2) + self.time * 100.0 / steps + rounding
-    }
-}
-
 impl Problem {
     /// Returns the problem of this name.
     ///
@@ -160,7 +152,9 @@ impl Problem {
 
     /// Returns the bound on the error relative to `exact` at a resolution of fixed τ.
     pub fn bound_at(&self, at: Resolution, precision: Precision) -> f64 {
-        self.bound.at(at.n, self.t_end / at.tau, precision)
+        let ErrorBound { space, time, single } = self.bound;
+        let rounding = if precision == Precision::F32 { single } else { 1e-9 };
+        space * (100.0 / at.n as f64).powi(2) + time * 100.0 / (self.t_end / at.tau) + rounding
     }
 }
 
