@@ -70,9 +70,9 @@ fn limits_in_f32_are_those_in_f64_within_their_errors() {
             farthest = farthest.max(off.abs() / exact);
         }
     }
-    // The control: errors that know nothing of rounding.
+    // The control: errors that know nothing of rounding miss.
     println!("{farthest} errors of f64");
-    assert!(farthest > 2.0);
+    assert!(farthest > 1.0);
     // Beyond the nodes of f32 members continue in f64.
     let numbers: BTreeSet<(bool, String)> = rows(&home.path().join("f32-0/levels.csv"))
         .iter()

@@ -26,14 +26,14 @@ struct Eliminated<N, const F: usize> {
 
 /// What made a row of the triangular factor: `g_i = (rhs_i - a·g_{i-2} - b·g_{i-1})·pivot`.
 #[derive(Clone, Copy, Debug)]
-struct Source<N, const F: usize> {
+struct PivotRow<N, const F: usize> {
     a: N,
     b: N,
     pivot: N,
     rhs: [N; F],
 }
 
-impl<N: Number, const F: usize> Source<N, F> {
+impl<N: Number, const F: usize> PivotRow<N, F> {
     #[inline(always)]
     fn eliminate(&self, rhs: N, above2: N, above1: N) -> N {
         (rhs - self.a * above2 - self.b * above1) * self.pivot
@@ -46,7 +46,7 @@ pub struct Factor<N, const F: usize> {
     /// The triangular factor: `n-2` rows.
     rows: Vec<Eliminated<N, F>>,
     /// What made them, in short numbers.
-    sources: Vec<Source<N, F>>,
+    pivot_rows: Vec<PivotRow<N, F>>,
     /// The last two equations.
     last: [Equation<N, F>; 2],
 }
@@ -57,7 +57,10 @@ impl<N: Number, const F: usize> Factor<N, F> {
         let (zero, core) = (N::default(), n.saturating_sub(2));
         Factor {
             rows: vec![Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] }; core],
-            sources: vec![Source { a: zero, b: zero, pivot: zero, rhs: [zero; F] }; if N::IS_SHORT { core } else { 0 }],
+            pivot_rows: vec![
+                PivotRow { a: zero, b: zero, pivot: zero, rhs: [zero; F] };
+                if N::IS_SHORT { core } else { 0 }
+            ],
             last: [Equation { a: zero, b: zero, c: zero, d: zero, e: zero, rhs: [zero; F], time_over_length: zero }; 2],
         }
     }
@@ -85,11 +88,11 @@ pub fn refine<N: Number, const F: usize>(
     lacks: [&mut Ring<N>; F],
     factor: &mut Factor<N, F>,
 ) -> N::Mask {
-    let Factor { rows, sources, last } = factor;
+    let Factor { rows, pivot_rows, last } = factor;
     let (core, mut last) = (rows.len(), *last);
     let (mut above2, mut above1) = ([N::of(0.0); F], [N::of(0.0); F]);
     for i in 0..core + 2 {
-        let rhs = if i < core { sources[i].rhs } else { last[i - core].rhs };
+        let rhs = if i < core { pivot_rows[i].rhs } else { last[i - core].rhs };
         let mut left = rhs;
         for f in 0..F {
             left[f] = rhs[f] - equations.applied(i, unknown[f]);
@@ -99,7 +102,7 @@ pub fn refine<N: Number, const F: usize>(
             continue;
         }
         for f in 0..F {
-            left[f] = sources[i].eliminate(left[f], above2[f], above1[f]);
+            left[f] = pivot_rows[i].eliminate(left[f], above2[f], above1[f]);
         }
         rows[i].g = left;
         (above2, above1) = (above1, left);
@@ -142,7 +145,7 @@ fn finish<N: Number, const F: usize>(
 /// Fills `factor`.
 #[inline(always)]
 fn eliminate<N: Number, const F: usize>(equations: &impl Equations<N, F>, factor: &mut Factor<N, F>) {
-    let Factor { rows, sources, last } = factor;
+    let Factor { rows, pivot_rows, last } = factor;
     let core = rows.len();
     let zero = N::of(0.0);
     let none = Eliminated { d: zero, e: zero, g: [zero; F], border: [zero; 2] };
@@ -170,17 +173,17 @@ fn eliminate<N: Number, const F: usize>(equations: &impl Equations<N, F>, factor
         // Row i minus a times the row two above leaves b' on z_{i-1}; minus b' times the row above leaves the pivot.
         let b = own.b - own.a * above2.d;
         let pivot = (own.c - own.a * above2.e - b * above1.d).recip();
-        let source = Source { a: own.a, b, pivot, rhs: own.rhs };
+        let pivot_row = PivotRow { a: own.a, b, pivot, rhs: own.rhs };
         let mut row = Eliminated { d: (own.d - b * above1.e) * pivot, e: own.e * pivot, g: own.rhs, border };
         for f in 0..F {
-            row.g[f] = source.eliminate(own.rhs[f], above2.g[f], above1.g[f]);
+            row.g[f] = pivot_row.eliminate(own.rhs[f], above2.g[f], above1.g[f]);
         }
         for c in 0..2 {
-            row.border[c] = source.eliminate(border[c], above2.border[c], above1.border[c]);
+            row.border[c] = pivot_row.eliminate(border[c], above2.border[c], above1.border[c]);
         }
         rows[i] = row;
         if N::IS_SHORT {
-            sources[i] = source;
+            pivot_rows[i] = pivot_row;
         }
         (above2, above1) = (above1, row);
     }
