@@ -82,6 +82,23 @@ fn limits_in_f32_are_those_in_f64_within_their_errors() {
 }
 
 #[test]
+fn the_error_of_a_limit_is_the_same_share_of_it_whatever_the_mobility() {
+    let home = TempDir::new().unwrap();
+    let [slow, fast] = [1.0, 1e4].map(|mobility| {
+        let spec =
+            format!("run --accurate --curves 2 --points 64 --mobility {mobility} --backend cpu --out {mobility}");
+        done(home.path(), &spec);
+        let rows = rows(&home.path().join(mobility.to_string()).join("summary.csv"));
+        rows.iter()
+            .map(|row| ["t_limit", "t_error"].map(|name| mobility * number::<f64>(row, name)))
+            .collect::<Vec<_>>()
+    });
+    for (slow, fast) in slow.into_iter().flatten().zip(fast.into_iter().flatten()) {
+        assert!((slow / fast - 1.0).abs() < 1e-9, "{slow} {fast}");
+    }
+}
+
+#[test]
 fn limits_by_sweeps_in_f32_are_those_of_f64() {
     let home = TempDir::new().unwrap();
     let spec = "run --accurate --shape ellipse:1.5,1 --amplitude 0.05 --curves 4 --points 64 --backend cpu";

@@ -142,7 +142,8 @@ impl Ladder {
             tolerance,
             share_of_steps,
             turn,
-            length: finest.length,
+            // That of unit mobility: times are that of the length to the fourth power.
+            length: finest.length / spec.mobility().powf(0.25),
             excess,
             terms,
         });

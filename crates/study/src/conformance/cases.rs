@@ -8,7 +8,7 @@ use curvelax_flow::{
     crystal::Crystal,
     flow::Flow,
     forcing::{Conserved, Drive, Forcing},
-    number::Precision,
+    number::{Precision, Real},
     scheme::{
         Parameters, State,
         run::{FIRST_ORDER, Run},
@@ -180,6 +180,12 @@ pub fn members(n: usize, count: usize, steps: u32) -> Result<Vec<Run<f64>>> {
             Ok(run)
         })
         .collect()
+}
+
+/// Returns the tolerance of adaptive steps that are compared. In f32 it is a large one: rounding, which is not the same
+/// on all devices, must not decide how much a step may grow.
+pub(super) fn adaptive_tolerance<T: Real>() -> f64 {
+    (4e5 * T::EPSILON).max(1e-3)
 }
 
 /// Creates the same members with adaptive steps of `tolerance`, to the time of `steps` of their own fixed steps, for a

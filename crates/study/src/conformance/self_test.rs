@@ -5,7 +5,7 @@
 
 use super::{
     adaptive_members,
-    cases::{Driven, LAWS},
+    cases::{Driven, LAWS, adaptive_tolerance},
     compare::{ConformanceRow, compare_ends, to_their_goals},
     members,
 };
@@ -20,11 +20,6 @@ use curvelax_flow::{
 const MEMBERS: usize = LAWS;
 /// Fixed steps; adaptive runs cover the same time.
 const STEPS: u32 = 2;
-/// Tolerance of adaptive steps.
-const ADAPTIVE: f64 = 1e-3;
-/// The same in units of ε, if that is larger: rounding, which is not the same on all devices, must not decide how much
-/// a step may grow.
-const ABOVE_ROUNDING: f64 = 4e5;
 /// Length of a single one, over a fixed step.
 const SHORT: f64 = 0.005;
 
@@ -47,7 +42,7 @@ pub fn self_test<T: Evolves>(
     let count = MEMBERS.min(backend.slots());
     let mut launches = match adaptive {
         false => members(n, count, STEPS)?,
-        true => adaptive_members(n, count, STEPS, ADAPTIVE.max(ABOVE_ROUNDING * T::EPSILON), T::PRECISION)?,
+        true => adaptive_members(n, count, STEPS, adaptive_tolerance::<T>(), T::PRECISION)?,
     };
     driven.change(&mut launches);
     if !matches!(driven, Driven::Paper | Driven::Geometric) && adaptive && T::PRECISION == Precision::F32 {

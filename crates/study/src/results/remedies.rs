@@ -4,7 +4,7 @@ use curvelax_ensemble::{
     Spec,
     request::{
         drawn::Drawn,
-        spec::{Pace, Pull},
+        spec::{Pace, Precision, Pull},
     },
 };
 use curvelax_flow::forcing::Drive;
@@ -18,6 +18,7 @@ pub(super) struct Remedies {
     driven: bool,
     vesicles: bool,
     stops: bool,
+    short: bool,
 }
 
 impl Remedies {
@@ -30,12 +31,13 @@ impl Remedies {
             driven: spec.sweep.has("drive") || spec.drive.as_ref().is_some_and(is_inwards),
             vesicles: spec.has_vesicles(),
             stops: spec.stops_when_relaxed(),
+            short: spec.precision == Some(Precision::F32),
         }
     }
 
     /// Of members that failed.
     pub(super) fn of_failures(&self) -> String {
-        let Remedies { geometric, adaptive, pulled, driven, .. } = *self;
+        let Remedies { geometric, adaptive, pulled, driven, short, .. } = *self;
         let mut text = String::from("unless the flow itself becomes singular");
         if driven {
             text += ", as where a strong force makes the sides of a thin curve meet";
@@ -49,7 +51,8 @@ impl Remedies {
                  curve, and a smaller --adaptive does not help (docs/method.md)"
             }
         };
-        text
+        // Vesicles and crystals at rest are moved by rounding alone.
+        text + if geometric && short { "; if they relax in f64, use --precision f64" } else { "" }
     }
 
     /// Of members that drifted.
@@ -92,6 +95,8 @@ mod tests {
         assert!(!pulled.of_drift().contains("auto") && pulled.of_failures().contains("ten times auto"));
         assert!(of("drive = 0.5").of_failures().contains("--adaptive --pull auto helps"));
         assert!(of("drive = 0.5").of_failures().contains("sides of a thin curve meet"));
+        assert!(of("precision = 'f32'\ndrive = 0.5").of_failures().ends_with("use --precision f64"));
+        assert!(!of("drive = 0.5").of_failures().contains("f64"));
         assert!(!pulled.of_failures().contains("sides") && !of("drive = -0.5").of_failures().contains("sides"));
     }
 

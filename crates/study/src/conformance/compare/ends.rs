@@ -9,7 +9,7 @@ use super::{
 };
 use crate::conformance::{
     bounds::{Bound, DECAY, FIELDS, PACE, REPORT, growth},
-    cases::{Driven, MEMBERS, adaptive_members, members},
+    cases::{Driven, MEMBERS, adaptive_members, adaptive_tolerance, members},
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::scheme::evolve::Evolves;
@@ -25,9 +25,6 @@ use curvelax_flow::{
 };
 use curvelax_gpu as gpu;
 use curvelax_gpu::kernel::Budget;
-
-/// Tolerance of adaptive steps in the comparison.
-pub(super) const ADAPTIVE: f64 = 1e-3;
 
 /// Fixed steps of a member that take as long as its adaptive run in the comparison.
 pub const ADAPTIVE_STEPS: u32 = 40;
@@ -64,7 +61,7 @@ pub(super) fn launches<T: Evolves>(
 ) -> Result<Vec<Run<f64>>> {
     let mut launches = match steps {
         Some(steps) => members(n, MEMBERS, steps)?,
-        None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, ADAPTIVE, T::PRECISION)?,
+        None => adaptive_members(n, MEMBERS, ADAPTIVE_STEPS, adaptive_tolerance::<T>(), T::PRECISION)?,
     };
     driven.change(&mut launches);
     match steps {
