@@ -1,7 +1,7 @@
 //! The charts: those of the program's report, with a curve for the CPU and one for the GPU.
 
 use curvelax_draw::{
-    charts::{Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory},
+    charts::{CellKey, ChartText, Decay, DecayCurve, DecayLaw, Survival, SurvivalCurve, Theory},
     medium::Medium,
 };
 use curvelax_ensemble::{Spec, outcome::linear_rate};
@@ -36,16 +36,20 @@ impl Charts {
     pub fn draw(self) -> Result<Value, String> {
         let spec = self.settings.study()?.spec().clone();
         let curves: Result<Vec<SurvivalCurve>, String> = self.runs.iter().map(Shown::survival).collect();
-        let survival = Survival { title: "Members not yet relaxed", curves: curves?, ..Survival::default() };
+        let text = self.text("Members not yet relaxed");
+        let survival = Survival { text, curves: curves?, ..Survival::default() };
         let curves: Vec<DecayCurve> = self.runs.iter().map(Shown::decay).collect();
         let theory = self.runs.first().zip(curves.first()).and_then(|(run, curve)| slope(&spec, run.area, curve));
-        let decay = Decay {
-            title: "Mean excess of all members",
-            theory: theory.into_iter().collect(),
-            curves,
-            ..Decay::default()
-        };
+        let text = self.text("Mean excess of all members");
+        let decay = Decay { text, theory: theory.into_iter().collect(), curves, ..Decay::default() };
         Ok(json!({ "survival": survival.draw(Medium::Screen), "decay": decay.draw(Medium::Screen) }))
+    }
+
+    /// A heading, and the runs of the legend.
+    fn text(&self, title: &str) -> ChartText {
+        let labels = self.runs.iter().map(|run| run.label.clone()).collect();
+        let key = CellKey { labels, ..CellKey::default() };
+        ChartText { title: title.into(), quantity: "t".into(), key, ..ChartText::default() }
     }
 }
 
@@ -53,7 +57,7 @@ impl Shown {
     fn survival(&self) -> Result<SurvivalCurve, String> {
         let seen = self.times.iter().map(|(t, relaxed)| Observation::new(relaxed.then_some(*t), *t));
         let sample = Sample::new(seen).map_err(|error| error.to_string())?;
-        let mut curve = SurvivalCurve { label: self.label.clone(), ..SurvivalCurve::default() };
+        let mut curve = SurvivalCurve::default();
         for Step { time, survival, variance, .. } in KaplanMeier::new(&sample).steps() {
             let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
             curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
@@ -64,7 +68,7 @@ impl Shown {
     }
 
     fn decay(&self) -> DecayCurve {
-        DecayCurve { label: self.label.clone(), t: self.t.clone(), mean: self.mean.clone(), ..DecayCurve::default() }
+        DecayCurve { t: self.t.clone(), mean: self.mean.clone(), ..DecayCurve::default() }
     }
 }
 
