@@ -263,8 +263,8 @@ fn ring(n: usize) -> Result<Blocks> {
 }
 
 impl ChosenBackend {
-    /// What the user should know about the choice for `spec`: a software GPU is used only if a GPU is requested, and f32
-    /// rounds vesicles at rest.
+    /// What the user should know about the choice for `spec`: a software GPU is used only if a GPU is requested, and
+    /// f32 rounds vesicles at rest.
     pub fn warnings(&self, spec: &Spec) -> Vec<String> {
         let software = self.device.gpu().filter(|_| self.is_software_gpu());
         let slow = software
