@@ -369,9 +369,9 @@ impl<N: Number> Workspace<N> {
 
     /// Returns the numbers that it holds per node.
     pub const fn numbers<S: Solves>() -> usize {
-        // What solutions lack, and what an elimination stores for them.
-        let refined = if S::FACTS.sweeps { 3 } else { 12 };
-        23 + S::FACTS.numbers_per_node + if N::IS_SHORT { refined } else { 0 }
+        // What k, x and y lack, and what the solver stores for it.
+        let refined = if N::IS_SHORT { 3 + S::FACTS.numbers_to_refine } else { 0 };
+        23 + S::FACTS.numbers_per_node + refined
     }
 
     fn with(blocks: Blocks, curvature: Memory<N, 1>, position: Memory<N, 2>) -> Workspace<N> {

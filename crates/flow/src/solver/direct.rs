@@ -24,6 +24,14 @@ struct Eliminated<N, const F: usize> {
     border: [N; 2],
 }
 
+impl<N: Number, const F: usize> Eliminated<N, F> {
+    /// `own - d·z_{i+1} - e·z_{i+2}`, with what is below already known.
+    #[inline(always)]
+    fn substitute(&self, own: N, below1: N, below2: N) -> N {
+        own - self.d * below1 - self.e * below2
+    }
+}
+
 /// What made a row of the triangular factor: `g_i = (rhs_i - a·g_{i-2} - b·g_{i-1})·pivot`.
 #[derive(Clone, Copy, Debug)]
 struct PivotRow<N, const F: usize> {
@@ -110,7 +118,7 @@ pub fn refine<N: Number, const F: usize>(
     let (mut below1, mut below2) = (above1, above1);
     for row in rows[..core - 1].iter_mut().rev() {
         for f in 0..F {
-            row.g[f] = row.g[f] - row.d * below1[f] - row.e * below2[f];
+            row.g[f] = row.substitute(row.g[f], below1[f], below2[f]);
         }
         (below2, below1) = (below1, row.g);
     }
@@ -196,10 +204,10 @@ fn substitute_back<N: Number, const F: usize>(rows: &mut [Eliminated<N, F>]) {
     let (mut below1, mut below2) = (rows[core - 1], rows[core - 1]);
     for row in rows[..core - 1].iter_mut().rev() {
         for f in 0..F {
-            row.g[f] = row.g[f] - row.d * below1.g[f] - row.e * below2.g[f];
+            row.g[f] = row.substitute(row.g[f], below1.g[f], below2.g[f]);
         }
         for c in 0..2 {
-            row.border[c] = row.border[c] - row.d * below1.border[c] - row.e * below2.border[c];
+            row.border[c] = row.substitute(row.border[c], below1.border[c], below2.border[c]);
         }
         (below2, below1) = (below1, *row);
     }

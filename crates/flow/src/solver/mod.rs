@@ -157,6 +157,8 @@ pub struct Facts {
     pub refuses_because: &'static str,
     /// Numbers per node of its [`Memory`], both systems of a step together.
     pub numbers_per_node: usize,
+    /// How many more it stores in short numbers, whose solutions are refined.
+    pub numbers_to_refine: usize,
     /// What the kernel needs to know about it.
     pub kernel: KernelFacts,
 }
@@ -206,6 +208,7 @@ impl Solves for Sweeps {
         refuses: &[],
         refuses_because: "",
         numbers_per_node: 13,
+        numbers_to_refine: 0,
         kernel: KernelFacts { shuffles: true, rows_per_block: 3 },
     };
 
@@ -253,6 +256,7 @@ impl Solves for Elimination {
         refuses: &["order", "tolerance", "sor", "max-sweeps"],
         refuses_because: "the direct solver makes no sweeps",
         numbers_per_node: 11,
+        numbers_to_refine: 9,
         kernel: KernelFacts { shuffles: false, rows_per_block: 6 },
     };
 

@@ -13,11 +13,10 @@ use super::{
     times::{Numbers, QUANTILES, Statistic, TimeStatistics, covered, intervals, places},
 };
 use csv::WriterBuilder;
-use serde::Serialize;
-
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, Status};
 use curvelax_statistics::{Description, Interval, Mean, Sample, interval};
+use serde::Serialize;
 
 /// Relaxation times of one cell.
 pub struct CellStatistics {
