@@ -25,7 +25,7 @@ const OF_MEMBERS: [(&str, &str, &str); 3] = [
 /// The columns of the table `name` of a run of `spec` with these statistics; none if it is no such table.
 ///
 /// # Errors
-/// As [`of_growing`].
+/// Those of the spec, whose cells have features of their own.
 pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Result<Vec<ColumnText>> {
     let of_row = |row: Option<Vec<StatisticsField>>| {
         row.into_iter().flatten().map(|field| [field.name, field.holds.to_owned(), field.meaning]).collect()
@@ -41,9 +41,6 @@ pub fn columns(name: &str, spec: &Spec, statistics: &EnsembleStatistics) -> Resu
 }
 
 /// The columns of a table that grows as members end, likewise.
-///
-/// # Errors
-/// Those of the spec, whose cells have features of their own.
 pub(super) fn of_growing(name: &str, spec: &Spec) -> Result<Vec<ColumnText>> {
     Ok(match name {
         names::SUMMARY => of::<Outcome>(),
