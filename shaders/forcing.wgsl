@@ -11,6 +11,8 @@ const KEPT_LENGTH = 28u;
 const ROUNDS = 4u;
 /// -φ of the position equation where forces act, in units of (2π/L)².
 const DAMPING = 4.0;
+/// Rounding of an area and a length of short numbers, in units of EPSILON and of themselves.
+const ROUNDING_OF_SIZES = 16.0;
 const TAU = 6.283185307179586;
 
 /// F + p of this step.
@@ -81,12 +83,19 @@ fn correct(old_x: vec, old_y: vec, by: Moves) {
     let part = vec(block_sum(ax * ax + ay * ay), block_sum(ax * lx + ay * ly), block_sum(lx * lx + ly * ly), 0.0);
     let squares = ring_sums(part);
     let p = &all_parameters[member].law;
+    let targets = vec2(p[KEPT_AREA], p[KEPT_LENGTH]);
+    var due = targets;
+    if IS_SHORT {
+        let old = windows(old_x, old_y);
+        due = beyond_rounding(targets, sizes(old.a, old.b));
+    }
     var along = vec2<real>(0.0, 0.0);
     for (var round = 0u; round < ROUNDS; round++) {
         // Others may still read the last sums.
         workgroupBarrier();
-        let now = sizes(new_x, new_y);
-        along += balanced(squares, p[KEPT_AREA] - now.x, p[KEPT_LENGTH] - now.y);
+        var lacks = due;
+        if IS_SHORT { lacks -= growth(old_x, old_y); } else { lacks -= sizes(new_x, new_y); }
+        along += balanced(squares, lacks.x, lacks.y);
         let nodes = windows(
             moved(old_x, by.x + (along.x * ax + along.y * lx)), moved(old_y, by.y + (along.x * ay + along.y * ly)),
         );
@@ -113,4 +122,31 @@ fn sizes(wx: Window, wy: Window) -> vec2<real> {
     let length = edge(rises_of_places(wx).here, rises_of_places(wy).here).length;
     let all = ring_sums(vec(block_sum(cross(wx, wy)), block_sum(length), 0.0, 0.0));
     return vec2(real(0.5) * all.x, all.y);
+}
+
+/// By how much `of` falls short of `targets`, beyond what it is rounded.
+fn beyond_rounding(targets: vec2<real>, of: vec2<real>) -> vec2<real> {
+    let short = targets - of;
+    let rounding = real(ROUNDING_OF_SIZES * EPSILON) * abs(targets);
+    return short - max(min(short, rounding), -rounding);
+}
+
+/// By how much area and length of the new polygon exceed those of the old one, by how far its nodes have moved.
+fn growth(old_x: vec, old_y: vec) -> vec2<real> {
+    let half = real(0.5);
+    let dx = apart(old_x, here(new_x));
+    let dy = apart(old_y, here(new_y));
+    let moves = windows(dx, dy);
+    let x = rises_of_places(new_x);
+    let y = rises_of_places(new_y);
+    let by_x = rises(moves.a);
+    let by_y = rises(moves.b);
+    let mx = x.here - half * by_x.here;
+    let my = y.here - half * by_y.here;
+    let next_x = x.plus1 - half * by_x.plus1;
+    let next_y = y.plus1 - half * by_y.plus1;
+    let twice_mean = edge(x.here, y.here).length + edge(x.here - by_x.here, y.here - by_y.here).length;
+    let longer = (by_x.here * mx + by_y.here * my) / twice_mean;
+    let all = ring_sums(vec(block_sum(dx * (my + next_y) - dy * (mx + next_x)), block_sum(longer + longer), 0.0, 0.0));
+    return vec2(half * all.x, all.y);
 }

@@ -190,9 +190,9 @@ impl<N: Number> Team<N> {
         let (mut errors, mut decline) = ([N::of(0.0); 2], [N::of(0.0); 2]);
         if branches.adaptive {
             extrapolation::finish_attempt(state, &mut work.new);
-            let ([old_x, old_y], by) = ([&state.curve.x, &state.curve.y], [&state.before.x, &state.before.y]);
+            let (old, by) = (state.curve.nodes(), state.before.nodes());
             let (law, blocks) = (branches.law, work.blocks);
-            forcing::correct([old_x, old_y], by, &mut work.new, parameters, law, blocks, &mut work.gradients);
+            forcing::correct(old, by, &mut work.new, parameters, law, blocks, &mut work.gradients);
         }
         let seen = observe::glance(&state.curve, &work.new, parameters, branches.law, work.blocks);
         if branches.adaptive {

@@ -11,7 +11,7 @@ use crate::{
     flow::QUOTIENT,
     forcing::KEPT_LENGTH,
     number::{Mask, Number},
-    solver::{self, Blocks},
+    solver::{self, Blocks, Ring},
 };
 
 /// Terms of the series of a root of unity after the first, enough for f32.
@@ -38,7 +38,7 @@ pub(super) fn dearer<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind,
     let law = p.law(kind);
     let mut sum = solver::Sums::new(blocks);
     for i in 0..curve.len() {
-        let edge = edge(curve, i);
+        let edge = edge(curve.nodes(), i);
         let [gamma, ..] = law.tension(forces::tangent_of(edge));
         sum.add(i, [gamma * edge[2] - p.law[AT_REST]]);
     }
@@ -48,17 +48,17 @@ pub(super) fn dearer<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind,
 
 /// Coordinates of the nodes i-1 and i: both x, then both y.
 #[inline(always)]
-pub(super) fn corner<N: Number>(curve: &Curve<N>, i: usize) -> [N; 4] {
-    let ([_, xm, x, ..], [_, ym, y, ..]) = (curve.x.window(i), curve.y.window(i));
+pub(super) fn corner<N: Number>([x, y]: [&Ring<N>; 2], i: usize) -> [N; 4] {
+    let ([_, xm, x, ..], [_, ym, y, ..]) = (x.window(i), y.window(i));
     [xm, x, ym, y].map(N::coordinate)
 }
 
 /// `x_{i-1} × x_i`.
 #[inline(always)]
-pub fn cross<N: Number>(curve: &Curve<N>, i: usize) -> N {
-    let [xm, x, ym, y] = corner(curve, i);
+pub fn cross<N: Number>(nodes: [&Ring<N>; 2], i: usize) -> N {
+    let [xm, x, ym, y] = corner(nodes, i);
     if N::IS_SHORT {
-        let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
+        let [[_, ex, ..], [_, ey, ..]] = nodes.map(|ring| ring.rises_of_places(i));
         return xm * ey - ex * ym;
     }
     xm * y - x * ym
@@ -166,9 +166,9 @@ impl<N: Number> Regular<N> {
     /// `(x_i - c) × e_i` exceeds that at rest; in f64 the length of the edge and `x_{i-1} × x_i`.
     #[inline(always)]
     pub(super) fn exceeded(&self, curve: &Curve<N>, i: usize, p: &Parameters<N>, kind: Kind) -> [N; 2] {
-        let [ex, ey, e] = edge(curve, i);
+        let [ex, ey, e] = edge(curve.nodes(), i);
         if !N::IS_SHORT {
-            return [e, cross(curve, i)];
+            return [e, cross(curve.nodes(), i)];
         }
         let root = root(i, curve.len());
         let [tx, ty] = turned(self.tangent, root);

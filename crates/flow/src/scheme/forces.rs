@@ -40,7 +40,7 @@ pub fn tangent_of<N: Number>([x, y, length]: [N; 3]) -> [N; 2] {
 #[inline(always)]
 fn fill_directions<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
     let (n, one, law) = (old.len(), N::of(1.0), motion.law);
-    let first = edge(old, 0);
+    let first = edge(old.nodes(), 0);
     let at_first = law.directed(tangent_of(first));
     let (mut length, mut here) = (first[2], at_first);
     for i in 0..n {
@@ -105,7 +105,7 @@ pub fn measure<N: Number>(old: &Curve<N>, motion: &mut Motion<N>) {
     let crystal = motion.law.kind.is_crystal();
     if !crystal {
         for i in 0..old.len() {
-            motion.edge[i] = edge(old, i)[2];
+            motion.edge[i] = edge(old.nodes(), i)[2];
         }
         motion.edge.close();
     }
@@ -203,7 +203,7 @@ mod tests {
             let State { curve, increments, .. } = &mut state;
             step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
             std::mem::swap(curve, &mut work.new);
-            lengths.push((0..nodes.len()).map(|i| edge(curve, i)[2]).sum());
+            lengths.push((0..nodes.len()).map(|i| edge(curve.nodes(), i)[2]).sum());
         }
         (state, lengths)
     }

@@ -18,7 +18,10 @@
 //! same force; so this changes the error of a step, not the limit.
 //!
 //! The rest, of second order in the step and in the spacing, is corrected in the new polygon: its
-//! nodes move along the gradients of its own area and length until both are what they should be.
+//! nodes move along the gradients of its own area and length until both are what they should be. In f32 a rounded area
+//! and length would move the nodes at every part of a step, on a vesicle near rest further than the flow does. There the
+//! change of both is found by the moves of the nodes, of which rounding is a share, and what the old polygon is off
+//! counts only beyond the rounding of its own sums.
 
 use super::{
     Curve, Parameters,
@@ -37,6 +40,8 @@ pub const ROUNDS: usize = 4;
 /// -φ of the position equation where forces act, in units of `(2π/L)²`: the least whole number that is stable for all
 /// modes of a circle in steps of any length and order.
 pub const DAMPING: f64 = 4.0;
+/// Rounding of an area and a length in f32, in units of ε and of themselves.
+pub const ROUNDING_OF_SIZES: f64 = 16.0;
 
 impl Kind {
     /// Whether anything acts beside the flow.
@@ -68,7 +73,7 @@ pub fn act<N: Number>(
         sums.add(i, [r * k, r * k * k, r * motion.beta[i], motion.rkb[i]]);
     }
     let [turn, bent, moved, turned] = sums.totals();
-    let [area, _] = sizes(old, blocks);
+    let [area, _] = sizes(old.nodes(), blocks);
     let drive = p.law[DRIVE] + p.law[FEEDBACK] * (area - p.law[FEEDBACK_AREA]);
     let (moved, turned) = (moved + drive * length, turned + drive * turn);
     let [pressure, tension] = balanced(kind.kept(), [length, turn, bent], [-moved, -turned]);
@@ -122,7 +127,7 @@ pub fn push<N: Number>(
 /// and y of each.
 #[inline(always)]
 pub fn correct<N: Number>(
-    [old_x, old_y]: [&Ring<N>; 2],
+    old: [&Ring<N>; 2],
     by: [&Ring<N>; 2],
     new: &mut Curve<N>,
     p: &Parameters<N>,
@@ -146,15 +151,17 @@ pub fn correct<N: Number>(
         squares.add(i, [ax * ax + ay * ay, ax * lx + ay * ly, lx * lx + ly * ly]);
     }
     let (squares, kept) = (squares.totals(), kind.kept());
+    let targets = [p.law[KEPT_AREA], p.law[KEPT_LENGTH]];
+    let due = if N::IS_SHORT { beyond_rounding(targets, sizes(old, blocks)) } else { targets };
     let mut along = [N::of(0.0); 2];
     for _ in 0..ROUNDS {
-        let [area, length] = sizes(new, blocks);
-        let found = balanced(kept, squares, [p.law[KEPT_AREA] - area, p.law[KEPT_LENGTH] - length]);
+        let [area, length] = if N::IS_SHORT { growth(old, new, blocks) } else { sizes(new.nodes(), blocks) };
+        let found = balanced(kept, squares, [due[0] - area, due[1] - length]);
         along = [along[0] + found[0], along[1] + found[1]];
         for i in 0..new.len() {
             let [ax, ay, lx, ly] = [&gradients[0], &gradients[1], &gradients[2], &gradients[3]].map(|ring| ring[i]);
-            new.x[i] = N::moved(old_x[i], by[0][i] + (along[0] * ax + along[1] * lx));
-            new.y[i] = N::moved(old_y[i], by[1][i] + (along[0] * ay + along[1] * ly));
+            new.x[i] = N::moved(old[0][i], by[0][i] + (along[0] * ax + along[1] * lx));
+            new.y[i] = N::moved(old[1][i], by[1][i] + (along[0] * ay + along[1] * ly));
         }
         new.x.close();
         new.y.close();
@@ -176,13 +183,48 @@ fn balanced<N: Number>([area_kept, length_kept]: [N; 2], [aa, ab, bb]: [N; 3], [
 
 /// The area and the length of a polygon.
 #[inline(always)]
-fn sizes<N: Number>(curve: &Curve<N>, blocks: Blocks) -> [N; 2] {
+fn sizes<N: Number>(nodes: [&Ring<N>; 2], blocks: Blocks) -> [N; 2] {
     let mut sums = Sums::new(blocks);
-    for i in 0..curve.len() {
-        sums.add(i, [super::excess::cross(curve, i), edge(curve, i)[2]]);
+    for i in 0..nodes[0].len() {
+        sums.add(i, [super::excess::cross(nodes, i), edge(nodes, i)[2]]);
     }
     let [twice, length] = sums.totals();
     [N::of(0.5) * twice, length]
+}
+
+/// By how much `sizes` fall short of `targets`, beyond what they are rounded.
+#[inline(always)]
+fn beyond_rounding<N: Number>(targets: [N; 2], sizes: [N; 2]) -> [N; 2] {
+    [0, 1].map(|i| {
+        let (short, rounding) = (targets[i] - sizes[i], N::of(ROUNDING_OF_SIZES * N::EPSILON) * targets[i].abs());
+        short - short.min(rounding).max(N::of(0.0) - rounding)
+    })
+}
+
+/// By how much area and length of a new polygon exceed those of the old one, by how far its nodes have moved: `½ Σ d_i ×
+/// (m_i + m_{i+1})` with the moves d and the means m of old and new edges, and `Σ (d_i - d_{i-1})·2m_i / (|e_i| +
+/// |e_i - (d_i - d_{i-1})|)`.
+#[inline(always)]
+fn growth<N: Number>([old_x, old_y]: [&Ring<N>; 2], new: &Curve<N>, blocks: Blocks) -> [N; 2] {
+    let half = N::of(0.5);
+    let moves = |old: &Ring<N>, new: &Ring<N>, i| {
+        let ([_, from_m, from, from_p, _], [_, m, x, p, _]) = (old.window(i), new.window(i));
+        [N::apart(from_m, m), N::apart(from, x), N::apart(from_p, p)]
+    };
+    let mut sums = Sums::new(blocks);
+    for i in 0..new.len() {
+        let ([_, ex, fx, _], [_, ey, fy, _]) = (new.x.rises_of_places(i), new.y.rises_of_places(i));
+        let ([dx_m, dx, dx_p], [dy_m, dy, dy_p]) = (moves(old_x, &new.x, i), moves(old_y, &new.y, i));
+        let (gx, gy) = (dx - dx_m, dy - dy_m);
+        let (mx, my) = (ex - half * gx, ey - half * gy);
+        let (next_x, next_y) = (fx - half * (dx_p - dx), fy - half * (dy_p - dy));
+        let (was_x, was_y) = (ex - gx, ey - gy);
+        let twice_mean = (ex * ex + ey * ey).sqrt() + (was_x * was_x + was_y * was_y).sqrt();
+        let longer = (gx * mx + gy * my) / twice_mean;
+        sums.add(i, [dx * (my + next_y) - dy * (mx + next_x), longer + longer]);
+    }
+    let [twice, longer] = sums.totals();
+    [half * twice, longer]
 }
 
 #[cfg(test)]

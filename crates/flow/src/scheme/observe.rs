@@ -100,7 +100,7 @@ pub fn glance<N: Number>(old: &Curve<N>, new: &Curve<N>, p: &Parameters<N>, kind
     let mut sums = solver::Sums::new(blocks);
     let regular = Regular::near(new, p, kind, blocks);
     for i in 0..new.len() {
-        let (k, r, e) = (new.k[i], p.length_of(new.r[i]), edge(new, i)[2]);
+        let (k, r, e) = (new.k[i], p.length_of(new.r[i]), edge(new.nodes(), i)[2]);
         turn = turn.max((k * r).bounded_abs());
         slack = slack.max((r - e).bounded_abs() - N::of(MAX_DRIFT) * e);
         minus_shortest = minus_shortest.max(-e.bounded_abs());
@@ -150,7 +150,7 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
         let k = curve.k[i];
         let energy = match kind.conserved {
             0 => p.energy_density(k) * p.length_of(curve.r[i]),
-            _ => p.energy_at_vertex(edge(curve, i), edge(curve, (i + 1) % curve.len())),
+            _ => p.energy_at_vertex(edge(curve.nodes(), i), edge(curve.nodes(), (i + 1) % curve.len())),
         };
         let [longer, more] = regular.exceeded(curve, i, p, kind);
         sums.add(i, [longer, more, energy, winding(curve, i)]);
@@ -170,7 +170,7 @@ pub fn maxima<N: Number>(curve: &Curve<N>, p: &Parameters<N>) -> Maxima<N> {
     let low = N::of(-2.0 * BIG);
     let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
     for i in 0..curve.x.len() {
-        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve, i)[2]);
+        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve.nodes(), i)[2]);
         m.drift = m.drift.max(((r - e) / e).bounded_abs());
         m.longest = m.longest.max(e.bounded_abs());
         m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
@@ -213,7 +213,7 @@ pub fn decline<N: Number>(
 fn changes<N: Number>(curve: &Curve<N>, slope: &Curve<N>, bend: &Curve<N>, law: &Law<N>, blocks: Blocks) -> [N; 4] {
     let mut sums = solver::Sums::new(blocks);
     for i in 0..curve.len() {
-        let [xm, x, ym, y] = corner(curve, i);
+        let [xm, x, ym, y] = corner(curve.nodes(), i);
         let ([_, um, u, ..], [_, vm, v, ..]) = (slope.x.window(i), slope.y.window(i));
         let ([_, sm, s, ..], [_, tm, t, ..]) = (bend.x.window(i), bend.y.window(i));
         let ([_, ex, ..], [_, ey, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));

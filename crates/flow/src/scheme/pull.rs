@@ -20,7 +20,8 @@ use crate::number::Number;
 #[inline(always)]
 pub fn turn<N: Number>(curve: &Curve<N>, i: usize) -> [N; 2] {
     let n = curve.len();
-    let (before, own, after) = (edge(curve, (i + n - 1) % n), edge(curve, i), edge(curve, (i + 1) % n));
+    let (before, own, after) =
+        (edge(curve.nodes(), (i + n - 1) % n), edge(curve.nodes(), i), edge(curve.nodes(), (i + 1) % n));
     let half = N::of(0.5);
     [vertex_turn(before, own) + vertex_turn(own, after), half * before[2] + own[2] + half * after[2]]
 }
@@ -35,7 +36,7 @@ pub fn pull<N: Number>(curve: &mut Curve<N>, p: &Parameters<N>, branches: Branch
     let share = rate / (N::of(1.0) + rate);
     for i in 0..curve.len() {
         let [angle, span] = turn(curve, i);
-        let (k, r, own) = (curve.k[i], curve.r[i], edge(curve, i)[2] - p.r_offset);
+        let (k, r, own) = (curve.k[i], curve.r[i], edge(curve.nodes(), i)[2] - p.r_offset);
         curve.k[i] = k + share * (angle / span - k);
         curve.r[i] = r + share * (own - r);
     }

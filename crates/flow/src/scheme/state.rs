@@ -112,6 +112,12 @@ impl<N: Number> Curve<N> {
         self.len() == 0
     }
 
+    /// Returns the places of the nodes, x and y.
+    #[inline(always)]
+    pub fn nodes(&self) -> [&Ring<N>; 2] {
+        [&self.x, &self.y]
+    }
+
     /// Returns the fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; CURVE_FIELDS] {
         [&self.x, &self.y, &self.k, &self.r]
@@ -449,8 +455,8 @@ pub fn advance<N: Number>(field: usize, old: &Ring<N>, increment: &Ring<N>, new:
 
 /// Returns the edge that ends at node i: `[Δx, Δy, |e|]`.
 #[inline(always)]
-pub fn edge<N: Number>(curve: &Curve<N>, i: usize) -> [N; 3] {
-    let ([_, dx, ..], [_, dy, ..]) = (curve.x.rises_of_places(i), curve.y.rises_of_places(i));
+pub fn edge<N: Number>(nodes: [&Ring<N>; 2], i: usize) -> [N; 3] {
+    let [[_, dx, ..], [_, dy, ..]] = nodes.map(|ring| ring.rises_of_places(i));
     [dx, dy, (dx * dx + dy * dy).sqrt()]
 }
 

@@ -18,7 +18,7 @@ pub struct Method {
     pub order: Order,
     /// Maximum sweeps per system; a member that needs more is stalled.
     pub max_sweeps: u32,
-    /// Highest order of an adaptive step; never above that of the [precision](super::extrapolation::most_order).
+    /// Highest order of an adaptive step; never above [`MOST_ORDER`].
     pub most_order: u32,
 }
 
@@ -142,7 +142,7 @@ pub fn step_by<N: Number, S: Solves>(
     let for_x = refinement::solve::<N, S, 2>(&equations, unknowns, position, lacks_positions, *blocks, &control, live);
     if branches.law.is_forced() {
         forcing::push(old, new, motion, p.tau, [&increments.x, &increments.y], by);
-        forcing::correct([&old.x, &old.y], [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);
+        forcing::correct(old.nodes(), [&by[0], &by[1]], new, p, branches.law, *blocks, gradients);
     } else {
         state::advance(0, &old.x, &increments.x, &mut new.x);
         state::advance(1, &old.y, &increments.y, &mut new.y);
