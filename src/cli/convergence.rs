@@ -130,7 +130,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     let folder = args.out.map(|out| open(&out, args.force, names)).transpose()?;
     if !args.quiet {
         note(&if args.work_precision { choice.place() } else { choice.sentence(&method) });
-        choice.warnings(&method).iter().for_each(|warning| note(&format!("warning: {warning}")));
+        choice.warning().iter().for_each(|warning| note(&format!("warning: {warning}")));
     }
     if refereed {
         return referee(&method, one, folder, args.quiet);

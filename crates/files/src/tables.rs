@@ -75,6 +75,8 @@ columns! { LevelRow, names::LEVELS:
     excess_start: number = excess_start, "as in `summary.csv`, at these nodes";
     t_vanish: event = t_vanish, "as in `summary.csv`";
     length_start: number = length_start, "as in `summary.csv`, at these nodes";
+    energy_start: number = energy_start, "as in `summary.csv`, at these nodes";
+    energy_end: number = energy_end, "as in `summary.csv`, at these nodes";
 }
 
 row! {

@@ -245,12 +245,6 @@ fn check_precision(spec: &Spec, precision: Precision) -> Result<()> {
             return Err(Error::value("tolerance", tolerance, problem, &allowed));
         }
     }
-    if precision == Precision::F32 && spec.refine && spec.keeps_both() {
-        let problem = "with --conserve area,length the energy at rest is rounded by more than --refine is to find";
-        // The CPU has f32 if it is asked for.
-        let cpu = if spec.precision.is_some() { "" } else { ", or --backend cpu" };
-        return Err(Error::value("precision", "f32", problem, &format!("use --precision f64{cpu}")));
-    }
     if precision == Precision::F32 && spec.points > MAX_POINTS_F32 {
         let problem = format!("f32 was verified against f64 up to {MAX_POINTS_F32} points; rounding grows like n^4");
         return Err(Error::value("points", spec.points, &problem, "use fewer points, or --precision f64"));
@@ -263,18 +257,10 @@ fn ring(n: usize) -> Result<Blocks> {
 }
 
 impl ChosenBackend {
-    /// What the user should know about the choice for `spec`: a software GPU is used only if a GPU is requested, and
-    /// f32 rounds vesicles at rest.
-    pub fn warnings(&self, spec: &Spec) -> Vec<String> {
-        let software = self.device.gpu().filter(|_| self.is_software_gpu());
-        let slow = software
-            .map(|gpu| format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name()));
-        let rounded = (self.precision == Precision::F32 && spec.keeps_both()).then(|| {
-            "in f32 vesicles at rest are moved by rounding: times may be off by 2e-3, and vesicles whose reduced area is \
-             above 0.8 may end as singular; use --precision f64"
-                .to_string()
-        });
-        slow.into_iter().chain(rounded).collect()
+    /// What the user should know about the choice: a software GPU is used only if a GPU is requested.
+    pub fn warning(&self) -> Option<String> {
+        let gpu = self.device.gpu().filter(|_| self.is_software_gpu())?;
+        Some(format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name()))
     }
 
     /// Returns the number type of the run.
@@ -533,18 +519,5 @@ mod tests {
         choose(&spec(MAX_POINTS_F32)).unwrap();
         let message = choose(&spec(MAX_POINTS_F32 + 1)).err().unwrap().to_string();
         assert!(message.contains("verified against f64 up to"), "{message}");
-    }
-
-    #[test]
-    fn vesicles_in_f32_are_warned_of() {
-        let warned = |precision, conserve: &str| {
-            let spec =
-                format!("flow = 'willmore'\nadaptive = 1e-3\nprecision = '{precision}'\nbackend = 'cpu'\n{conserve}");
-            let spec = Spec::from_toml(&spec).unwrap();
-            choose(&spec).unwrap().warnings(&spec)
-        };
-        let both = "conserve = 'area,length'";
-        assert!(warned("f32", both)[0].contains("use --precision f64"));
-        assert!(warned("f64", both).is_empty() && warned("f32", "conserve = 'area'").is_empty());
     }
 }

@@ -11,6 +11,8 @@ const OF_STEPS: f64 = 5e-5;
 const OF_NODES: f64 = 6.0;
 /// Of the excess of a crystal, which is compared with one at rest by energy and area, in units of ε over the excess.
 const OF_ENERGY: f64 = 0.1;
+/// Of the energy of a vesicle, in units of ε over the share of its way at which it is relaxed.
+const OF_REST: f64 = 0.5;
 /// How much larger they are in the geometric form.
 const OF_GEOMETRIC: f64 = 3.0;
 
@@ -37,6 +39,8 @@ struct AtLevel {
     length: f64,
     /// Excess of the initial curve.
     excess: f64,
+    /// How far the energy of the curve went, relative to that at its end.
+    way: f64,
     /// The numbers in which it was computed.
     precision: Precision,
 }
@@ -123,7 +127,11 @@ impl Ladder {
         }
         let tolerance = tolerance(spec);
         let form = if spec.is_geometric() { OF_GEOMETRIC } else { 1.0 };
-        let energy = if spec.has_crystals() { OF_ENERGY } else { 0.0 };
+        let energy = match of {
+            EndTime::Relaxation if spec.keeps_both() => OF_REST / (spec.threshold(1.0) * finest.way),
+            _ if spec.has_crystals() => OF_ENERGY / excess,
+            _ => 0.0,
+        };
         let rounding = precisions.into_iter().map(|precision| form * rounding(precision, excess, energy)).collect();
         let terms = if spec.shape.typical().is_outline() {
             Terms::Points
@@ -168,8 +176,9 @@ impl LevelTimes {
             return Err(format!("a member after {}: members of a level ascend, each once", last.member));
         }
         let LevelRow { member, turn, length_start: length, excess_start: excess, precision, .. } = *row;
+        let way = ((row.energy_start - row.energy_end) / row.energy_end).abs();
         let [t_relax, t_vanish] = [row.t_relax, row.t_vanish].map(|t| t.unwrap_or(f64::NAN));
-        own.push(AtLevel { member, t_relax, t_vanish, turn, length, excess, precision });
+        own.push(AtLevel { member, t_relax, t_vanish, turn, length, excess, way, precision });
         self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
@@ -305,12 +314,12 @@ fn turn(spec: &Spec, at: &AtLevel) -> f64 {
     if spec.refine { spec.turns() * at.turn } else { at.turn }
 }
 
-/// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit). The root
-/// of the excess is about the amplitude.
+/// By how much rounding moves a time at this excess, relative to the time (docs/internals/precision.md#limit), where an
+/// energy is compared by so many ε. The root of the excess is about the amplitude.
 fn rounding(precision: Precision, excess: f64, energy: f64) -> f64 {
     let epsilon = precision.epsilon();
     match precision {
-        Precision::F32 => OF_STEPS.hypot(OF_NODES * epsilon / excess.sqrt()).hypot(energy * epsilon / excess),
+        Precision::F32 => OF_STEPS.hypot(OF_NODES * epsilon / excess.sqrt()).hypot(energy * epsilon),
         Precision::F64 => 0.0,
     }
 }

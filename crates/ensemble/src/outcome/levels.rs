@@ -193,6 +193,10 @@ pub struct LevelRow {
     pub length_start: f64,
     /// Excess of the initial curve.
     pub excess_start: f64,
+    /// Energy of the initial curve.
+    pub energy_start: f64,
+    /// Energy of the final curve.
+    pub energy_end: f64,
     /// The times of its events, in the order of the spec: the rows of `event_levels.csv`.
     pub events: Vec<Option<f64>>,
 }
@@ -214,6 +218,8 @@ impl LevelRow {
             turn: ended.turn,
             length_start: ended.start.length,
             excess_start: ended.start.excess,
+            energy_start: ended.start.energy,
+            energy_end: ended.end.energy,
             events: ended.events.clone(),
         }
     }

@@ -74,7 +74,7 @@ impl PlacedStudy {
 
     /// What the user should know about the study and where it is computed.
     pub fn warnings(&self) -> Vec<String> {
-        self.study.warnings().into_iter().chain(self.first().1.warnings(self.study.spec())).collect()
+        self.study.warnings().into_iter().chain(self.first().1.warning()).collect()
     }
 
     /// Where everything is computed, except perhaps the pilot.
