@@ -236,6 +236,7 @@ mod tests {
     use crate::{
         flow::Flow,
         forcing::{Conserved, Drive, Forcing},
+        number::place::NodePlace,
         scheme::{
             evolve::{Team, evolve},
             run::Run,
@@ -376,5 +377,38 @@ mod tests {
         let run = followed(&nodes, &Flow::Willmore, &forcing, 1.0);
         let moved = run.state.curve.positions().zip(&nodes).map(|(now, then)| now.distance(*then)).fold(0.0, f64::max);
         assert!(run.counters.status == 0 && moved < 1e-6, "{} {moved:e}", run.counters.status);
+    }
+
+    /// In f32, by the exact places of the nodes: rounded sums are off by more than ten times as much.
+    #[test]
+    fn area_and_length_are_kept_in_f32_without_the_rounding_of_their_sums() {
+        let (nodes, blocks) = (ellipse(1.6, 1.0, 100), Blocks::new(100).unwrap());
+        let exact = |curve: &Curve<f32>| {
+            sizes(Curve::<f64>::from_nodes(&curve.positions().collect::<Vec<_>>()).nodes(), blocks)
+        };
+        let mut p = Parameters::of_flow(&Flow::Willmore, 0.0);
+        keeping_both(&nodes).write(&mut p.law, 1.0);
+        let (p, old) = (p.convert::<f32>(), Curve::<f32>::from_nodes(&nodes));
+        let [mut kept, mut rounded] = [0.0_f64; 2];
+        for wave in 1..20 {
+            let mut new = Curve::zeros(100);
+            let mut by = [Ring::zeros(100), Ring::zeros(100)];
+            for i in 0..100 {
+                let turn = (wave * i) as f32 * 0.1;
+                (by[0][i], by[1][i]) = (1e-3 * turn.cos(), 1e-3 * turn.sin());
+                (new.x[i], new.y[i]) = (f32::moved(old.x[i], by[0][i]), f32::moved(old.y[i], by[1][i]));
+            }
+            new.x.close();
+            new.y.close();
+            let mut gradients = [0; 4].map(|_| Ring::zeros(100));
+            correct(old.nodes(), [&by[0], &by[1]], &mut new, &p, p.kind_of_law(), blocks, &mut gradients);
+            let (then, now, sums) = (exact(&old), exact(&new), sizes(new.nodes(), blocks));
+            for i in 0..2 {
+                kept = kept.max((now[i] / then[i] - 1.0).abs());
+                rounded = rounded.max((f64::from(sums[i]) / now[i] - 1.0).abs());
+            }
+        }
+        println!("kept to {kept:.1e}, rounded by {rounded:.1e}");
+        assert!(kept < 5e-9 && rounded > 10.0 * kept, "kept to {kept:.1e}, rounded by {rounded:.1e}");
     }
 }
