@@ -83,7 +83,7 @@ fn correct(old_x: vec, old_y: vec, by: Moves) {
     let part = vec(block_sum(ax * ax + ay * ay), block_sum(ax * lx + ay * ly), block_sum(lx * lx + ly * ly), 0.0);
     let squares = ring_sums(part);
     let p = &all_parameters[member].law;
-    let targets = vec2(p[KEPT_AREA], p[KEPT_LENGTH]);
+    let targets = vec2<real>(p[KEPT_AREA], p[KEPT_LENGTH]);
     var due = targets;
     if IS_SHORT {
         let old = windows(old_x, old_y);
@@ -124,11 +124,11 @@ fn sizes(wx: Window, wy: Window) -> vec2<real> {
     return vec2(real(0.5) * all.x, all.y);
 }
 
-/// By how much `of` falls short of `targets`, beyond what it is rounded.
-fn beyond_rounding(targets: vec2<real>, of: vec2<real>) -> vec2<real> {
-    let short = targets - of;
+/// By how much area and length fall short of `targets`, beyond what they are rounded.
+fn beyond_rounding(targets: vec2<real>, own: vec2<real>) -> vec2<real> {
+    let missing = targets - own;
     let rounding = real(ROUNDING_OF_SIZES * EPSILON) * abs(targets);
-    return short - max(min(short, rounding), -rounding);
+    return missing - max(min(missing, rounding), -rounding);
 }
 
 /// By how much area and length of the new polygon exceed those of the old one, by how far its nodes have moved.

@@ -138,7 +138,7 @@ fn when_a_vesicle_is_relaxed_has_a_limit_that_its_bar_holds() {
         let start = "--shape ellipse:2.5,1 --amplitude 0.05 --decay 2 --curves 2 --seed 7";
         run(&format!("--accurate --flow willmore --conserve area,length {start} {flags}")).summary()
     };
-    let [long, short] = ["f64", "f32"].map(|digits| of(&format!("--points 64 --backend cpu --precision {digits}")));
+    let [long, short] = ["f64", "f32"].map(|digits| of(&format!("--points 64 --precision {digits}")));
     let truth = of("--points 256 --adaptive=1e-4");
     let mut farthest = 0.0_f64;
     for (row, exact) in long.iter().chain(&short).zip(truth.iter().cycle()) {
@@ -159,7 +159,7 @@ fn nearly_round_vesicles_rest_in_f32() {
     for (axes, points) in [("1.3,1", 64), ("1.3,1", 100), ("1.6,1", 100)] {
         let [long, short] = ["f64", "f32"].map(|digits| {
             let start = format!("--shape ellipse:{axes} --amplitude 0 --curves 1 --points {points} --t-end 1");
-            let method = format!("--adaptive=1e-4 --pull auto --backend cpu --precision {digits}");
+            let method = format!("--adaptive=1e-4 --pull auto --precision {digits}");
             run(&format!("--flow willmore --conserve area,length {start} {method}")).summary().remove(0)
         });
         assert_eq!(short["status"], "relaxed", "{axes} by {points}");

@@ -17,11 +17,11 @@
 //! as a part of both components, and steps would be no longer than R⁴/3 even at rest. The increments are those of the
 //! same force; so this changes the error of a step, not the limit.
 //!
-//! The rest, of second order in the step and in the spacing, is corrected in the new polygon: its
-//! nodes move along the gradients of its own area and length until both are what they should be. In f32 a rounded area
-//! and length would move the nodes at every part of a step, on a vesicle near rest further than the flow does. There the
-//! change of both is found by the moves of the nodes, of which rounding is a share, and what the old polygon is off
-//! counts only beyond the rounding of its own sums.
+//! The rest, of second order in the step and in the spacing, is corrected in the new polygon: its nodes move along the
+//! gradients of its own area and length until both are what they should be. In f32 a rounded area and length would move
+//! the nodes at every part of a step, on a vesicle near rest further than the flow does. There the change of both is
+//! found by the moves of the nodes, of which rounding is a share, and what the old polygon is off counts only beyond
+//! the rounding of its own sums.
 
 use super::{
     Curve, Parameters,
@@ -196,13 +196,13 @@ fn sizes<N: Number>(nodes: [&Ring<N>; 2], blocks: Blocks) -> [N; 2] {
 #[inline(always)]
 fn beyond_rounding<N: Number>(targets: [N; 2], sizes: [N; 2]) -> [N; 2] {
     [0, 1].map(|i| {
-        let (short, rounding) = (targets[i] - sizes[i], N::of(ROUNDING_OF_SIZES * N::EPSILON) * targets[i].abs());
-        short - short.min(rounding).max(N::of(0.0) - rounding)
+        let (missing, rounding) = (targets[i] - sizes[i], N::of(ROUNDING_OF_SIZES * N::EPSILON) * targets[i].abs());
+        missing - missing.min(rounding).max(N::of(0.0) - rounding)
     })
 }
 
-/// By how much area and length of a new polygon exceed those of the old one, by how far its nodes have moved: `½ Σ d_i ×
-/// (m_i + m_{i+1})` with the moves d and the means m of old and new edges, and `Σ (d_i - d_{i-1})·2m_i / (|e_i| +
+/// By how much area and length of a new polygon exceed those of the old one, by how far its nodes have moved: `½ Σ d_i
+/// × (m_i + m_{i+1})` with the moves d and the means m of old and new edges, and `Σ (d_i - d_{i-1})·2m_i / (|e_i| +
 /// |e_i - (d_i - d_{i-1})|)`.
 #[inline(always)]
 fn growth<N: Number>([old_x, old_y]: [&Ring<N>; 2], new: &Curve<N>, blocks: Blocks) -> [N; 2] {
