@@ -9,8 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     choices::{
-        BackendChoice, FinalTime, Omega, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau, list, some_list,
-        some_numbers,
+        BackendChoice, FinalTime, OrAuto, PositionForm, SolverChoice, Store, Tables, list, some_list, some_numbers,
     },
     drawn::Drawn,
     event::Event,
@@ -242,7 +241,7 @@ keys! {
         units: Option<Units> = None, "LENGTH,TIME", Evolution;
         /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
         #[serde(skip_serializing_if = "Option::is_none")]
-        tau: Option<Tau> = None, "TAU", Evolution;
+        tau: Option<OrAuto> = None, "TAU", Evolution;
         /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL
         /// before SPEC.toml [default: off]
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -255,12 +254,12 @@ keys! {
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
         /// [default: 1 with --tau, auto with --adaptive and --tau auto]
         #[serde(skip_serializing_if = "Option::is_none")]
-        omega: Option<Omega> = None, "OMEGA", Evolution;
+        omega: Option<OrAuto> = None, "OMEGA", Evolution;
         /// Move nodes along the normal only [default: false]
         no_redistribution: bool = false, "BOOL", Evolution;
         /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of
         /// the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
-        pull: Pull = Pull::Rate(0.0), "KAPPA", Method;
+        pull: OrAuto = OrAuto::Number(0.0), "KAPPA", Method;
         /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the
         /// force of the polygon itself, which halves the error of smooth, well resolved curves and fails for others;
         /// auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
@@ -279,7 +278,7 @@ keys! {
         /// Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system
         /// [default: 1; auto with --adaptive]
         #[serde(skip_serializing_if = "Option::is_none")]
-        sor: Option<Sor> = None, "FACTOR", Method;
+        sor: Option<OrAuto> = None, "FACTOR", Method;
         /// Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled` [default: 200000]
         max_sweeps: u32 = 200_000, "COUNT", Method;
         /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]

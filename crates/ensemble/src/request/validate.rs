@@ -8,8 +8,8 @@ mod times;
 
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
-    BackendChoice, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm, Precision, Pull,
-    ROUNDINGS, Sor, Spec, Store, Tau,
+    BackendChoice, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, OrAuto, Order, Pace, PositionForm, Precision, ROUNDINGS,
+    Spec, Store,
 };
 use curvelax_base::{
     error::{Error, Result},
@@ -153,7 +153,7 @@ impl Spec {
     }
 
     fn check_omega(&self) -> Result<()> {
-        let Omega::Rate(omega) = self.omega() else { return Ok(()) };
+        let OrAuto::Number(omega) = self.omega() else { return Ok(()) };
         if !(omega.is_finite() && omega >= 0.0) {
             let allowed = "use 0, a positive number such as 1, or auto";
             return Err(Error::value("omega", number(omega), "not a redistribution speed", allowed));
@@ -162,7 +162,7 @@ impl Spec {
             return Ok(());
         }
         match self.pace() {
-            Pace::Fixed(Tau::Step(tau)) if omega * tau > MAX_OMEGA_TAU => {
+            Pace::Fixed(OrAuto::Number(tau)) if omega * tau > MAX_OMEGA_TAU => {
                 let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
                 Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
             }
@@ -180,7 +180,7 @@ impl Spec {
     }
 
     fn check_pull(&self) -> Result<()> {
-        let Pull::Rate(rate) = self.pull else { return Ok(()) };
+        let OrAuto::Number(rate) = self.pull else { return Ok(()) };
         if !(rate.is_finite() && rate >= 0.0) {
             let allowed = "use 0 for the paper's scheme, a positive number, or auto";
             return Err(Error::value("pull", number(rate), "not a rate", allowed));
@@ -197,7 +197,7 @@ impl Spec {
             let allowed = format!("use a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
             return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
         }
-        if let Some(Sor::Factor(factor)) = self.sor
+        if let Some(OrAuto::Number(factor)) = self.sor
             && !(factor > 0.0 && factor < 2.0)
         {
             let problem = "sweeps do not converge with this over-relaxation";
@@ -284,7 +284,7 @@ impl Spec {
             (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
             self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
             // Folders of earlier versions name the paper's factor whatever the solver.
-            self.sor.filter(|sor| *sor != Sor::Factor(1.0)).map(|sor| ("sor", sor.to_string())),
+            self.sor.filter(|sor| *sor != OrAuto::Number(1.0)).map(|sor| ("sor", sor.to_string())),
             (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
         ];
         let Facts { refuses, refuses_because: problem, .. } = *self.solver().facts();

@@ -10,7 +10,7 @@ use std::{borrow::Cow, path::Path, sync::Arc};
 
 use crate::{
     Family, LevelTimes, Member, Outlines, RefinementLevel, Spec, Variation,
-    request::spec::{FinalTime, Store, Tau},
+    request::spec::{FinalTime, OrAuto, Store},
     theory::times,
 };
 use curvelax_base::error::{Error, Result};
@@ -60,7 +60,7 @@ impl Study {
         if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scales())) {
             return Study::of_cells(spec, cells);
         }
-        let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };
+        let tau = if spec.adaptive.is_some() { None } else { Some(OrAuto::Auto) };
         let own = Spec { tau, t_end: Some(FinalTime::Auto), omega: None, ..spec }.validate()?;
         drop(cells);
         let cells = self::cells(&own, &outlines)?;

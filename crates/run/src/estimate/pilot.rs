@@ -16,7 +16,7 @@ use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Ended, Extent, Outcome, SeriesRow, Sink, Snapshot,
     outcome::rows,
-    request::spec::{Pace, Precision, Tau},
+    request::spec::{OrAuto, Pace, Precision},
     schedule::Clock,
     simulate::simulate,
 };
@@ -410,7 +410,7 @@ fn extrapolated(pilots: &[PilotResult], all: u64, cost: impl Fn(&PilotResult) ->
 /// Steps of a member, if these do not depend on its curve.
 fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
-        Pace::Fixed(Tau::Step(tau)) if !spec.stops_when_relaxed() => {
+        Pace::Fixed(OrAuto::Number(tau)) if !spec.stops_when_relaxed() => {
             Some(f64::from(Clock::new(tau, spec.final_time()).steps))
         }
         _ => None,
