@@ -13,7 +13,7 @@ use curvelax_curve::Interpolation;
 
 pub use crate::request::{
     choices::{BackendChoice, FinalTime, OrAuto, Pace, PositionForm, SolverChoice, Store, Tables},
-    key::{HelpHeading, OmittedKeys, Spec, SpecKey},
+    key::{OmittedKeys, Spec, SpecKey, heading},
     units::Units,
 };
 use curvelax_flow::forcing::Conserved;
