@@ -71,7 +71,7 @@ fn one(spec: &Spec) -> Outcome {
 /// Runs a member to its end by hand, so that its last state can be inspected, even where the program refuses its n.
 fn follow<T: Evolves>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &[]);
+    let outputs = Outputs::new(spec.final_time(), spec.series, [&spec.snapshots, &[], &[]]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());

@@ -65,6 +65,12 @@ impl Spec {
         Ok(self)
     }
 
+    /// Does the same with the spec of a cell whose members, an index in the cell each, were checked with those of all.
+    pub(crate) fn validate_alone(mut self) -> Result<Spec> {
+        let (only, shard) = (self.only.take(), self.shard.take());
+        Ok(Spec { only, shard, ..self.validate()? })
+    }
+
     /// Fills in the choices left open, so that a printed spec shows them.
     fn fill_defaults(&mut self) {
         if let Pace::Fixed(tau) = self.pace() {

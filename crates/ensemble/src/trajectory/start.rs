@@ -9,7 +9,7 @@ use super::{
     watch::{ROUND, Watch, resolution},
 };
 use crate::{
-    Member, Observables, Rows, Spec, Status,
+    Member, Observables, Paused, Spec, Status,
     request::spec::{OrAuto, Pace, Precision},
     schedule::{self, Clock, Outputs, Ticks},
     theory::rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
@@ -91,16 +91,10 @@ impl<'a> Trajectory<'a> {
             t_end: spec.final_time(),
             time,
             outputs,
-            served: 0,
-            counters: launch.counters,
-            report: launch.report,
+            at: Paused { counters: launch.counters, report: launch.report, ..Paused::default() },
             launch,
             start,
-            rows: Rows::default(),
-            frames: Vec::new(),
-            sweeps: [0; 2],
             course,
-            crossed: None,
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
@@ -109,7 +103,7 @@ impl<'a> Trajectory<'a> {
             settling: Settling::of(spec, &start),
             conserved: forcing.conserved.is_some(),
         };
-        trajectory.counters.status = status.map_or(0, |status| status as u32);
+        trajectory.at.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
         trajectory.look(&state);
         // At the start one row and one snapshot are due.
