@@ -100,8 +100,6 @@ pub(super) enum Served<'a> {
     Over(u64, Box<Ended>),
     /// With another goal, if it has one.
     Runs(Box<Resident<'a>>, Option<Box<Aim>>),
-    /// Its rows fill the memory that it has before all output times are served; with its state.
-    Full(Box<Resident<'a>>, Option<Box<State<f64>>>),
 }
 
 /// A member in a slot.
