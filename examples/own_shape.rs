@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use curvelax::{
     curve::{BaseCurve, Outline},
-    ensemble::{Spec, Study, request::spec::Pull},
+    ensemble::{Spec, Study, request::spec::OrAuto},
     relax,
 };
 use glam::DVec2;
@@ -27,7 +27,7 @@ fn main() -> curvelax::Result<()> {
             curves: 1,
             amplitude: 0.0.into(),
             adaptive: Some(1e-3),
-            pull: Pull::Auto,
+            pull: OrAuto::Auto,
             relax_at: Some(0.01),
             stop_when_relaxed: Some(true),
             ..Spec::default()

@@ -6,11 +6,7 @@ use std::path::Path;
 
 use curvelax::{
     curve::{BaseCurve, Modes, Outline, RadialFactor, Sampler, Sampling, Shape},
-    ensemble::{
-        Family, Spec,
-        request::spec::{Pull, Sor},
-        request::sweep::SweepAxis,
-    },
+    ensemble::{Family, Spec, request::spec::OrAuto, request::sweep::SweepAxis},
     flow::Flow,
 };
 use libfuzzer_sys::fuzz_target;
@@ -43,7 +39,7 @@ fn words(bytes: &[u8]) {
     if let Ok(modes) = text.parse::<Modes>() {
         assert_eq!(modes.to_string().parse(), Ok(modes));
     }
-    let _ = (text.parse::<Sampling>(), text.parse::<Pull>(), text.parse::<Sor>());
+    let _ = (text.parse::<Sampling>(), text.parse::<OrAuto>());
     if let Ok(axis) = text.parse::<SweepAxis>() {
         assert_eq!(axis.labels().len(), axis.values.len());
     }

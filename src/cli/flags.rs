@@ -6,24 +6,18 @@
 use clap::{Arg, ArgAction, ArgMatches, Command, FromArgMatches, builder::ValueParser};
 
 use super::parsers::{shard, word_of};
+pub(super) use crate::ensemble::request::spec::heading::{EVOLUTION, MACHINE, METHOD, OUTPUT};
 use crate::{
     ensemble::{
         Spec,
         request::{
-            spec::{HelpHeading, SpecKey},
+            spec::SpecKey,
             sweep::{self, SweepAxis},
             value::Takes,
         },
     },
     error::{Error, Result, echo},
 };
-
-/// Heading of the flags for the method.
-pub(super) const METHOD: &str = HelpHeading::Method.name();
-/// Heading of the flags for the machine.
-pub(super) const MACHINE: &str = HelpHeading::Machine.name();
-/// Heading of the flags for output.
-pub const OUTPUT: &str = HelpHeading::Output.name();
 
 /// The flag that stands for several keys, and the first of them in the help after it.
 const ACCURATE: &str = "accurate";
@@ -37,7 +31,7 @@ pub struct SpecFlags {
 
 /// The flag of a key.
 fn flag(key: &'static SpecKey) -> Arg {
-    let arg = Arg::new(key.name).long(key.name).value_name(key.value).help(key.help()).help_heading(key.heading.name());
+    let arg = Arg::new(&*key.name).long(&*key.name).value_name(key.value).help(key.help()).help_heading(key.heading);
     let checked = ValueParser::from(|word: &str| (key.check)(word).map(|()| word.to_owned()));
     match (key.takes, key.missing) {
         // The name of a Slurm job array stands for two numbers.
@@ -61,12 +55,11 @@ fn flag(key: &'static SpecKey) -> Arg {
 
 impl clap::Args for SpecFlags {
     fn augment_args(command: Command) -> Command {
-        let accurate =
-            Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(HelpHeading::Evolution.name());
+        let accurate = Arg::new(ACCURATE).long(ACCURATE).action(ArgAction::SetTrue).help_heading(EVOLUTION);
         let accurate = accurate.help(
             "What we recommend for numbers to publish: --adaptive --pull auto --omega auto --t-end auto --stop-when-relaxed --refine; vesicles (--conserve area,length) run without --stop-when-relaxed. Each can still be set on its own [default: off]",
         );
-        Spec::KEYS.iter().fold(command, |command, key| {
+        Spec::table().iter().fold(command, |command, key| {
             let command = if key.name == AFTER_ACCURATE { command.arg(accurate.clone()) } else { command };
             command.arg(flag(key))
         })
@@ -79,8 +72,8 @@ impl clap::Args for SpecFlags {
 
 impl FromArgMatches for SpecFlags {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let words = |key: &'static SpecKey| Some((key, matches.get_many::<String>(key.name)?.cloned().collect()));
-        Ok(SpecFlags { given: Spec::KEYS.iter().filter_map(words).collect(), accurate: matches.get_flag(ACCURATE) })
+        let words = |key: &'static SpecKey| Some((key, matches.get_many::<String>(&key.name)?.cloned().collect()));
+        Ok(SpecFlags { given: Spec::table().iter().filter_map(words).collect(), accurate: matches.get_flag(ACCURATE) })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
@@ -110,7 +103,7 @@ impl SpecFlags {
 
     /// The keys given as flags, without those that are swept.
     fn given(&self) -> Vec<String> {
-        self.given.iter().map(|(key, _)| key.name).filter(|name| *name != "sweep").map(str::to_owned).collect()
+        self.given.iter().map(|(key, _)| key.name.clone()).filter(|name| name != "sweep").collect()
     }
 
     fn has(&self, name: &str) -> bool {

@@ -5,7 +5,7 @@ use crate::{
     curve::{Modes, Perturbation, Shape},
     ensemble::{
         Drawn, Spec,
-        request::spec::{PositionForm, Pull},
+        request::spec::{OrAuto, PositionForm},
     },
     error::{Error, Result},
     files::{OutputFolder, names, tables::Table, truth_tables::TruthRow},
@@ -61,8 +61,8 @@ pub struct RefereeFlags {
     #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(), requires = "referee", help_heading = REFEREE)]
     form: Option<PositionForm>,
     /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
-    #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
-    pull: Option<Pull>,
+    #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<OrAuto>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
+    pull: Option<OrAuto>,
 }
 
 const REFEREE: &str = "Referee";

@@ -13,7 +13,7 @@ use curvelax::{
     },
     ensemble::{
         Cell, Ended, Family, Paused, RunProgress, Sink, SinkRequest, Spec,
-        request::spec::{FinalTime, Precision, Pull, Solver, Tau},
+        request::spec::{FinalTime, OrAuto, Precision, Solver},
     },
     scheme::step::Method,
     simulate::resume,
@@ -162,10 +162,13 @@ fn specs() -> Vec<(&'static str, Spec)> {
         specs.push(("fixed steps", fixed(solver)));
         specs.push(("adaptive steps", adaptive(solver)));
     }
-    let by_size = Spec { tau: Some(Tau::Auto), t_end: Some(FinalTime::Auto), ..fixed(Solver::Direct) };
+    let by_size = Spec { tau: Some(OrAuto::Auto), t_end: Some(FinalTime::Auto), ..fixed(Solver::Direct) };
     specs.push(("times by the size of the curves", by_size));
     // With a long dumbbell.
-    specs.push((CROSSING, Spec { t_end: Some(1.5.into()), points: 128, pull: Pull::Auto, ..adaptive(Solver::Direct) }));
+    specs.push((
+        CROSSING,
+        Spec { t_end: Some(1.5.into()), points: 128, pull: OrAuto::Auto, ..adaptive(Solver::Direct) },
+    ));
     let short = Spec {
         t_end: Some(0.0502.into()),
         stop_when_relaxed: Some(true),

@@ -10,7 +10,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, Shape, polygon},
     ensemble::{
         Cell, Ended, Family, Outcome, Sink, Spec, Status,
-        request::spec::{BackendChoice, Omega, Precision, Pull, Solver, SolverChoice, Sor, Tau},
+        request::spec::{BackendChoice, OrAuto, Precision, Solver, SolverChoice},
     },
     equilibrium::Equilibrium,
     flow::Flow,
@@ -63,9 +63,9 @@ fn potato(u: f64) -> DVec2 {
 }
 
 /// The fixed step of `spec`, `factor` times as long.
-fn times(spec: &Spec, factor: f64) -> Option<Tau> {
-    let Some(Tau::Step(tau)) = spec.tau else { panic!("no fixed step: {spec:?}") };
-    Some(Tau::Step(factor * tau))
+fn times(spec: &Spec, factor: f64) -> Option<OrAuto> {
+    let Some(OrAuto::Number(tau)) = spec.tau else { panic!("no fixed step: {spec:?}") };
+    Some(OrAuto::Number(factor * tau))
 }
 
 /// 100 steps, in which the curve loses its shorter waves.
@@ -149,7 +149,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
             let scaled = Spec {
                 tau: times(&spec, c.powi(4)),
                 t_end: Some((spec.final_time() * c.powi(4)).into()),
-                omega: Some(Omega::Rate(1.0 / c.powi(4))),
+                omega: Some(OrAuto::Number(1.0 / c.powi(4))),
                 flow: Flow::Elastic(0.4 / (c * c)).into(),
                 ..spec.clone()
             };
@@ -175,7 +175,7 @@ fn a_larger_curve_is_slower_by_the_fourth_power() {
 fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
     for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-4)] {
         let fixed = method(precision, Solver::Direct);
-        let (omega, pull) = (Some(Omega::Auto), Pull::Auto);
+        let (omega, pull) = (Some(OrAuto::Auto), OrAuto::Auto);
         let spec = Spec {
             tau: None,
             adaptive: Some(1e-3),
@@ -200,13 +200,13 @@ fn adaptive_steps_and_the_pull_scale_and_move_with_the_curve() {
             assert!(large.steps == outcome.steps || (c == 3.0 && precision == Precision::F32), "{c}: {}", large.steps);
         }
         // The negative controls: an unscaled ω and an unscaled pull make a difference.
-        let fixed = Spec { omega: Some(Omega::Rate(1.0)), ..spec.clone() };
+        let fixed = Spec { omega: Some(OrAuto::Number(1.0)), ..spec.clone() };
         let (_, slow) = relaxed(&fixed, potato);
         let flow = Flow::Elastic(0.1).into();
         let (_, large) =
             relaxed(&Spec { t_end: Some((16.0 * spec.final_time()).into()), flow, ..fixed }, |u| 2.0 * potato(u));
         assert!(distance(&slow, &large.iter().map(|node| *node / 2.0).collect::<Vec<_>>()) > 1e-6);
-        let rate = Pull::Rate(40.0);
+        let rate = OrAuto::Number(40.0);
         let (_, pulled) = relaxed(&Spec { pull: rate, ..spec.clone() }, potato);
         let (t_end, flow) = (Some((16.0 * spec.final_time()).into()), Flow::Elastic(0.1).into());
         let (_, large) = relaxed(&Spec { t_end, flow, pull: rate, ..spec.clone() }, |u| 2.0 * potato(u));
@@ -251,7 +251,7 @@ fn the_work_of_a_run_is_what_it_was() {
     let spec = |flow: Flow, n, sor| Spec {
         points: n,
         flow: flow.into(),
-        sor: Some(Sor::Factor(sor)),
+        sor: Some(OrAuto::Number(sor)),
         tau: Some(1e-3.into()),
         t_end: Some(0.1.into()),
         ..method(Precision::F64, Solver::GaussSeidel)
@@ -259,9 +259,9 @@ fn the_work_of_a_run_is_what_it_was() {
     let direct = Spec { solver: Solver::Direct.into(), ..spec(Flow::Willmore, 61, 1.0) };
     let adaptive =
         Spec { tau: None, adaptive: Some(1e-3), solver: SolverChoice::Auto, ..spec(Flow::Willmore, 61, 1.0) };
-    let adaptive = Spec { omega: Some(Omega::Rate(1.0)), ..adaptive };
+    let adaptive = Spec { omega: Some(OrAuto::Number(1.0)), ..adaptive };
     let swept = Spec { solver: Solver::GaussSeidel.into(), ..adaptive.clone() };
-    let automatic = Spec { sor: Some(Sor::Auto), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
+    let automatic = Spec { sor: Some(OrAuto::Auto), ..spec(Flow::SurfaceDiffusion, 100, 1.0) };
     let stops =
         Spec { stop_when_relaxed: Some(true), t_end: Some(2.0.into()), ..spec(Flow::SurfaceDiffusion, 50, 1.7) };
     let mut changed = Vec::new();

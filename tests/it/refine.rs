@@ -6,7 +6,7 @@ use curvelax::{
     Error,
     ensemble::{
         Ended, Spec, Study,
-        request::spec::{BackendChoice, FinalTime, Pull},
+        request::spec::{BackendChoice, FinalTime, OrAuto},
     },
     relax,
 };
@@ -31,7 +31,7 @@ fn spec(text: &str, curves: u64, points: usize, adaptive: f64) -> Spec {
         points,
         adaptive: Some(adaptive),
         t_end: Some(FinalTime::Auto),
-        pull: Pull::Auto,
+        pull: OrAuto::Auto,
         backend: BackendChoice::Cpu,
         ..Spec::from_toml(text).unwrap()
     }
@@ -84,7 +84,7 @@ fn bars_hold_the_limit_and_are_not_idle() {
 fn a_pilot_tells_the_error_of_fixed_and_adaptive_steps() {
     let truth = truth(PROBLEMS[0], 8);
     for (tau, adaptive) in [(Some(1e-3.into()), None), (None, Some(1e-3))] {
-        let spec = Spec { tau, adaptive, pull: Pull::Rate(0.0), ..spec(PROBLEMS[0], 128, 100, 1e-3) };
+        let spec = Spec { tau, adaptive, pull: OrAuto::Number(0.0), ..spec(PROBLEMS[0], 128, 100, 1e-3) };
         let members = run(Spec { t_end: None, stop_when_relaxed: Some(true), ..spec });
         let judged: Vec<f64> = members.iter().filter_map(|of| Some(of.outcome.judged?.relative)).collect();
         let exact = |(member, truth): (&Ended, &f64)| member.outcome.t_relax.unwrap() / truth - 1.0;

@@ -10,7 +10,7 @@ use curvelax::{
     curve::{BaseCurve, Sampling, crossing, polygon},
     ensemble::{
         Cell, Ended, Family, Member, Observables, Outcome, Snapshot, Spec, Status,
-        request::spec::{BackendChoice, Omega, Precision, Pull, Sor, Tau},
+        request::spec::{BackendChoice, OrAuto, Precision},
     },
     flow::Flow,
     placement,
@@ -71,7 +71,7 @@ fn one(spec: &Spec) -> Outcome {
 /// Runs a member to its end by hand, so that its last state can be inspected, even where the program refuses its n.
 fn follow<T: Evolves>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let n = member.nodes.len();
-    let outputs = Outputs::new(spec.final_time(), spec.series, &spec.snapshots, &[]);
+    let outputs = Outputs::new(spec.final_time(), spec.series, [&spec.snapshots, &[], &[]]);
     let mut trajectory = Trajectory::new(member, spec, T::PRECISION, &outputs);
     let mut run = trajectory.launch().convert::<T>();
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());
@@ -149,9 +149,13 @@ fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
 /// A curve at rest that is followed for 10⁵ relaxation times with hardly any redistribution loses its mesh in the end.
 #[test]
 fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
-    let omega = |rate| Some(Omega::Rate(rate));
-    let spec =
-        |omega, t_end: f64| Spec { pull: Pull::Auto, omega, t_end: Some(t_end.into()), ..adaptive("ellipse:2,1", 100) };
+    let omega = |rate| Some(OrAuto::Number(rate));
+    let spec = |omega, t_end: f64| Spec {
+        pull: OrAuto::Auto,
+        omega,
+        t_end: Some(t_end.into()),
+        ..adaptive("ellipse:2,1", 100)
+    };
     let long = one(&spec(omega(1e-4), 20_000.0));
     assert_eq!(long.status, Status::Relaxed);
     assert!(long.t_end < 20_000.0, "it lost its mesh: {}", long.t_end);
@@ -191,8 +195,8 @@ fn an_ellipse_relaxes_when_it_should_in_twenty_steps_and_not_with_a_coarse_fixed
 #[test]
 fn a_nonconvex_curve_relaxes_when_it_should_with_the_pull_and_not_without() {
     for (n, bound) in [(100, 0.02), (200, 0.01)] {
-        let spec = Spec { pull: Pull::Auto, t_end: Some(0.17.into()), ..adaptive("nonconvex", n) };
-        let (pulled, plain) = (one(&spec), one(&Spec { pull: Pull::Rate(0.0), ..spec }));
+        let spec = Spec { pull: OrAuto::Auto, t_end: Some(0.17.into()), ..adaptive("nonconvex", n) };
+        let (pulled, plain) = (one(&spec), one(&Spec { pull: OrAuto::Number(0.0), ..spec }));
         println!("n = {n}: {:?} in {} steps, without the pull {:?}", pulled.t_relax, pulled.steps, plain.t_relax);
         assert!(near(pulled.t_relax, 0.0855, bound) && pulled.steps <= 50, "{pulled:?}");
         assert!(!near(plain.t_relax, 0.0855, 2.0 * bound), "the control passes: {plain:?}");
@@ -219,7 +223,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
                     interpolate: Some(curvelax::curve::Interpolation::Polygon),
                     rounding: Some(0.0),
                     pull,
-                    omega: Some(Omega::Rate(omega)),
+                    omega: Some(OrAuto::Number(omega)),
                     relax_at: Some(0.01),
                     ..adaptive(&format!("file:examples/islands/{island}.csv"), n)
                 };
@@ -229,14 +233,14 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
                 // Times go as the fourth power of the size.
                 [time, time * (1.0 + run.mollified.area_change).powi(2)]
             };
-            let times = [64, 100, 128, 200, 256].map(|n| at(n, Pull::Auto));
+            let times = [64, 100, 128, 200, 256].map(|n| at(n, OrAuto::Auto));
             println!("{island}, omega = {omega}: {times:.4?}");
             let [.., [coarse, smaller_coarse], _, [fine, smaller_fine]] = times;
             assert!(near(Some(coarse), fine, 0.015), "{island}: {coarse} and {fine}");
             for (found, expected) in [smaller_coarse, smaller_fine].into_iter().zip(table) {
                 assert!(near(Some(found), expected, 0.02), "{island}: {found} instead of {expected}");
             }
-            let [_, without] = at(128, Pull::Rate(0.0));
+            let [_, without] = at(128, OrAuto::Number(0.0));
             worst_without = worst_without.max((without / table[0] - 1.0).abs());
         }
     }
@@ -247,7 +251,7 @@ fn islands_relax_at_every_n_when_an_independent_program_says_and_not_without_the
 fn rows_at_given_times_do_not_depend_on_where_steps_fell_and_change_no_step() {
     // Largest difference from a tight tolerance, of the length and of the excess over its start.
     for (shape, t_end, bounds) in [("ellipse:2,1", 2.0, [5e-5, 6e-4]), ("nonconvex", 0.17, [8e-5, 1e-4])] {
-        let spec = Spec { pull: Pull::Auto, t_end: Some(t_end.into()), ..adaptive(shape, 100) };
+        let spec = Spec { pull: OrAuto::Auto, t_end: Some(t_end.into()), ..adaptive(shape, 100) };
         let snapshots = vec![0.3 * t_end, 0.77 * t_end];
         let rows = Spec { series: Some(t_end / 97.0), snapshots, ..spec.clone() };
         let (loose, tight) = (run(&rows).remove(0), run(&Spec { adaptive: Some(1e-5), ..rows }).remove(0));
@@ -285,7 +289,7 @@ fn a_time_to_relax_is_as_exact_as_the_steps_that_lead_to_it() {
         amplitude: 0.093.into(),
         curves: 12,
         seed: 41_838,
-        pull: Pull::Auto,
+        pull: OrAuto::Auto,
         t_end: Some(0.2.into()),
         ..adaptive("flower:5:0.027,5:0.039", 193)
     };
@@ -305,7 +309,7 @@ fn a_time_to_relax_is_as_exact_as_the_steps_that_lead_to_it() {
 /// A step is at most about 1/ω long, since lengths approach their mean explicitly.
 #[test]
 fn a_circle_stays_at_rest_through_a_long_run_in_either_precision() {
-    let spec = Spec { pull: Pull::Auto, t_end: Some(1e4.into()), ..adaptive("ellipse:2,1", 100) };
+    let spec = Spec { pull: OrAuto::Auto, t_end: Some(1e4.into()), ..adaptive("ellipse:2,1", 100) };
     for precision in [Precision::F64, Precision::F32] {
         let outcome = one(&Spec { precision: Some(precision), ..spec.clone() });
         let Outcome { status, steps, end, start, .. } = &outcome;
@@ -378,7 +382,7 @@ fn one_sweep_is_too_few_and_the_member_stalls_in_finite_time() {
     // Steps of any length can be solved once they are short enough; the member creeps on until it has made its share.
     println!("{} steps to {}", outcome.steps, outcome.t_end);
     assert!(outcome.steps > 1000 && outcome.t_end < 0.1, "{outcome:?}");
-    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Some(Sor::Factor(1.7)), ..spec }).status, Status::Relaxed);
+    assert_eq!(one(&Spec { max_sweeps: 200_000, sor: Some(OrAuto::Number(1.7)), ..spec }).status, Status::Relaxed);
 }
 
 fn crosses(snapshot: &Snapshot) -> bool {
@@ -393,7 +397,7 @@ fn a_crossing_is_seen_when_dense_snapshots_see_it_and_nowhere_else() {
     let [mut crossed, mut simple, mut relaxed] = [0; 3];
     for (j, corners) in bells.iter().chain(&random).enumerate() {
         for (tolerance, n) in [(1e-3, 128), (1e-4, 128), (1e-3, 200)] {
-            let spec = Spec { pull: Pull::Auto, adaptive: Some(tolerance), ..adaptive("circle:1", n) };
+            let spec = Spec { pull: OrAuto::Auto, adaptive: Some(tolerance), ..adaptive("circle:1", n) };
             let spec = Spec { t_end: Some(20.0.into()), stop_when_relaxed: Some(true), ..spec };
             let outcome = run_of(&spec, file(corners)).remove(0).outcome;
             let until = outcome.self_crossing.unwrap_or(outcome.t_end);
@@ -437,8 +441,8 @@ fn a_polygon_that_crosses_itself_has_done_so_from_the_start() {
 /// The spec for random polygons.
 fn for_polygons(omega: f64) -> Spec {
     Spec {
-        pull: Pull::Auto,
-        omega: Some(Omega::Rate(omega)),
+        pull: OrAuto::Auto,
+        omega: Some(OrAuto::Number(omega)),
         relax_at: Some(0.01),
         stop_when_relaxed: Some(true),
         ..adaptive("circle:1", 128)
@@ -490,12 +494,12 @@ fn single_precision_against_double() {
             for n in [50, 100, 200, 256, 320, 400, 512] {
                 let spec = Spec {
                     flow: flow.clone().into(),
-                    tau: pace.map(Tau::Step),
+                    tau: pace.map(OrAuto::Number),
                     stop_when_relaxed: Some(true),
                     t_end: Some(20.0.into()),
                     ..adaptive("ellipse:2,1", n)
                 };
-                let pull = if pace.is_none() { Pull::Auto } else { Pull::Rate(0.0) };
+                let pull = if pace.is_none() { OrAuto::Auto } else { OrAuto::Number(0.0) };
                 let spec = Spec { adaptive: pace.map_or(Some(1e-3), |_| None), pull, ..spec }.validate().unwrap();
                 let member = || Family::new(&spec).unwrap().member(0).unwrap();
                 let (single, double) =

@@ -66,7 +66,7 @@ fn run<T: Vectorised>(specs: &[Spec], vectors: Vectors, threads: usize, slots: u
     let blocks = Blocks::new(specs[0].points).unwrap();
     let backend = CpuBackend::<T>::with_vectors(blocks, method, threads, vectors).unwrap();
     let mut all = Vec::new();
-    let cells: Vec<Cell> = specs.iter().flat_map(|spec| Study::new(spec.clone()).unwrap().into_cells()).collect();
+    let cells: Vec<Cell> = specs.iter().flat_map(|spec| Study::new(spec.clone()).unwrap().cells().to_vec()).collect();
     simulate(&cells, T::PRECISION, &mut Fewer(Box::new(backend), slots), 2, &mut all).unwrap();
     all
 }

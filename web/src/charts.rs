@@ -78,8 +78,7 @@ fn slope(spec: &Spec, area: f64, curve: &DecayCurve) -> Option<Theory> {
     let first = curve.mean.first()?;
     let tenth = curve.mean.iter().position(|mean| *mean <= 0.1 * first)?;
     let (t, mean) = (curve.t[tenth], curve.mean[tenth]);
-    let rate =
-        spec.rate_in_theory(&values, [area, f64::NAN]).or_else(|| linear_rate::rate_at(spec, &values, area, t))?;
+    let rate = linear_rate::rate_at(spec, area, t)?;
     let law = match spec.growth(&values.flow, &values.forcing, area) {
         Some(time) => DecayLaw::Algebraic { start: mean * (1.0 + t / time).powf(rate), time, power: rate },
         None => DecayLaw::Exponential { start: mean * (rate * t).exp(), rate },

@@ -177,13 +177,9 @@ fn at_most(t_end: f64, t: f64) -> f64 {
 }
 
 impl Outputs {
-    /// Creates the outputs of a run to `t_end`: every `series` from 0 on, each of `snapshots` and of `frames`.
-    pub fn new(t_end: f64, series: Option<f64>, snapshots: &[f64], frames: &[f64]) -> Outputs {
-        Outputs::with_energies(t_end, series, [snapshots, frames, &[]])
-    }
-
-    /// Creates them with the times of `others`: of snapshots, of frames, and of energies.
-    pub fn with_energies(t_end: f64, series: Option<f64>, others: [&[f64]; 3]) -> Outputs {
+    /// Creates the outputs of a run to `t_end`: every `series` from 0 on, and the times of `others`: of snapshots, of
+    /// frames, and of energies.
+    pub fn new(t_end: f64, series: Option<f64>, others: [&[f64]; 3]) -> Outputs {
         let count = series.map_or(0, |dt| (t_end / dt * (1.0 + ON_A_STEP)) as usize + 1);
         let rows = SeriesTimes { t_end, every: series.unwrap_or(0.0), count };
         let output = |t: f64, kind: usize| Output {
@@ -263,7 +259,7 @@ mod tests {
     #[test]
     fn output_times_fall_on_steps_or_between_them() {
         let clock = Clock::new(0.1, 1.0);
-        let outputs = Outputs::new(1.0, Some(0.25), &[0.3, 0.5, 1.0], &[]);
+        let outputs = Outputs::new(1.0, Some(0.25), [&[0.3, 0.5, 1.0], &[], &[]]);
         let brief: Vec<_> = outputs.from(0).map(|o| (o.t, clock.locate(o.t).0, o.series, o.snapshot)).collect();
         assert_eq!(
             brief,
@@ -304,7 +300,7 @@ mod tests {
         for series in [None, Some(0.1), Some(0.17), Some(1.7 / 3.0), Some(1.7), Some(2.0), Some(1e-3)] {
             for snapshots in [&[][..], &[0.0], &[0.1, 0.17, 0.3, 0.5], &[0.0, 1.0, 1.7 * (1.0 - 1e-12), 1.7]] {
                 for frames in [&[][..], &frames] {
-                    let outputs = Outputs::new(1.7, series, snapshots, frames);
+                    let outputs = Outputs::new(1.7, series, [snapshots, frames, &[]]);
                     let found: Vec<_> = outputs.from(0).map(|o| (o.t, [o.series, o.snapshot, o.frame])).collect();
                     assert_eq!(found, sorted(1.7, series, snapshots, frames), "{series:?} {snapshots:?}");
                     assert_eq!(outputs.len(), found.len());
@@ -322,7 +318,7 @@ mod tests {
                     let t_end = tau * f64::from(steps);
                     let clock = Clock::new(tau, t_end);
                     let dt = t_end / f64::from(rows);
-                    let outputs = Outputs::new(t_end, Some(dt), &[t_end, 0.5 * t_end], &[]);
+                    let outputs = Outputs::new(t_end, Some(dt), [&[t_end, 0.5 * t_end], &[], &[]]);
                     for output in outputs.from(0) {
                         let (step, fraction) = clock.locate(output.t);
                         assert!(fraction > 0.0 && fraction <= 1.0, "tau {tau}, t_end {t_end}: {output:?}");

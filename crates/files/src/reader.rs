@@ -265,10 +265,7 @@ impl<'a> Summary<'a> {
         outcome.events = rows.iter().map(EventTime::time).collect();
         let limits = rows.iter().map(|row| row.t_limit.zip(row.t_error));
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
-        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| {
-            let values = spec.values_of(member, cell).ok()?;
-            linear_rate::rate_of(spec, &values, &outcome)
-        });
+        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| linear_rate::rate_of(spec, &outcome));
         let judged = |of: &Outcome| {
             [
                 ("t_limit", of.t_limit),

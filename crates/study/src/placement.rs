@@ -13,7 +13,7 @@ use curvelax_backend::{
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Spec, Study,
-    request::spec::{BackendChoice, Precision, Sor},
+    request::spec::{BackendChoice, OrAuto, Precision},
     study::Stage,
 };
 use curvelax_flow::{
@@ -232,7 +232,7 @@ fn check_precision(spec: &Spec, precision: Precision) -> Result<()> {
         let problem = "in f32 sweeps leave larger errors with it than --refine is to find";
         let tightest = precision.tolerance(true);
         let [tolerance, other] = [spec.tolerance_at(precision), tightest].map(|tolerance| format!("{tolerance:e}"));
-        if spec.sor() != Sor::Auto {
+        if spec.sor() != OrAuto::Auto {
             return Err(Error::value(
                 "sor",
                 spec.sor(),

@@ -38,7 +38,7 @@ use curvelax_base::{
     text::count,
 };
 use curvelax_curve::{
-    BaseCurve, Modes, Perturbation, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions,
+    BaseCurve, Perturbation, RadialFactor, RadialLaw, Sampler, Sampling, Shape, check_directions,
     outlines::{self, Labelled},
     polygon,
 };
@@ -90,17 +90,13 @@ pub struct Member {
 pub struct Family {
     /// The curve of all members; if each has its own, that of the typical values, or the first outline.
     sampler: Arc<Sampler>,
+    /// Its spec, without lists.
+    spec: Arc<Spec>,
+    /// The law of the perturbation at the typical values, whose modes all members have.
     law: RadialLaw,
-    perturbation: Perturbation,
-    seed: u64,
-    /// The spec, if members have values of their own.
-    drawn: Option<Arc<Spec>>,
     /// The sizes that the starts of all members are given.
     sizes: Option<Sizes>,
     curves: Curves,
-    /// Property of the outlines whose values are groups.
-    group_by: Option<String>,
-    sampling: Sampling,
     /// How outlines become curves, and what the one of all members has become.
     treatment: Treatment,
     outline_curve: OutlineCurve,
@@ -147,23 +143,20 @@ impl Family {
     /// # Errors
     /// [`Error::Request`] if one of them, or the file of the shape, is wrong.
     pub fn new(spec: &Spec) -> Result<Family> {
-        match spec.shape.typical().outlines_from(Path::new("")) {
-            Some(outlines) => Family::of_outlines(spec, OutlineSet::new(outlines?)?.into()),
-            None => Family::of_shape(spec),
-        }
+        let outlines = spec.shape.typical().outlines_from(Path::new(""));
+        let outlines = outlines.map(|all| OutlineSet::new(all?)).transpose()?;
+        Family::with(spec, outlines.map(Arc::new).as_ref())
     }
 
-    /// Does the same as [`Family::new`], for a shape that is a formula.
-    pub(crate) fn of_shape(spec: &Spec) -> Result<Family> {
-        let curves = if spec.shape.is_drawn() { Curves::Drawn } else { Curves::One };
-        Family::of_curve(spec, spec.shape.typical().resolve()?, curves, None)
-    }
-
-    /// Does the same as [`Family::new`], with `outlines`, at least one, in place of the shape.
-    pub(crate) fn of_outlines(spec: &Spec, outlines: Arc<OutlineSet>) -> Result<Family> {
+    /// Does the same as [`Family::new`], with `outlines`, at least one, if the shape is no formula.
+    pub(crate) fn with(spec: &Spec, outlines: Option<&Arc<OutlineSet>>) -> Result<Family> {
+        let Some(outlines) = outlines else {
+            let curves = if spec.shape.is_drawn() { Curves::Drawn } else { Curves::One };
+            return Family::of_curve(spec, spec.shape.typical().resolve()?, curves, None);
+        };
         let none = || Error::value("shape", &spec.shape, "there is no outline", "give one");
         let first = Arc::clone(&outlines.all.first().ok_or_else(none)?.outline);
-        let curves = OutlineCurves::new(outlines, Treatment::of(spec, None));
+        let curves = OutlineCurves::new(Arc::clone(outlines), Treatment::of(spec, None));
         Family::of_curve(spec, BaseCurve::from_outline(first), Curves::Outlines(curves.into()), None)
     }
 
@@ -237,26 +230,21 @@ impl Family {
             mollify(&mut nodes, || sampler.area(&RadialFactor::default()), simple);
         }
         let scales = match &curves {
-            Curves::Drawn => scales(spec)?,
+            Curves::Drawn => {
+                spec.probes().iter().map(|values| scale(values.shape.resolve()?)).collect::<Result<_>>()?
+            }
             Curves::Outlines(curves) if curves.set.all.len() > 1 => Arc::clone(&curves.set.scales),
             _ => [CurveScale::of(&nodes)].into(),
         };
-        let (sampler, directions) = (Arc::new(sampler), check_directions(spec.modes.high).into());
-        let Spec { perturbation, seed, sampling, .. } = *spec;
-        let drawn = drawn(spec);
         Ok(Family {
-            sampler,
+            sampler: Arc::new(sampler),
+            spec: without_lists(spec),
             law,
-            perturbation,
-            seed,
-            drawn,
             sizes: Sizes::of(spec),
             curves,
-            group_by: spec.group_by.clone(),
-            sampling,
             treatment,
             outline_curve,
-            directions,
+            directions: check_directions(spec.modes.high).into(),
             warnings,
             has_corners,
             scales,
@@ -274,11 +262,7 @@ impl Family {
             true => Arc::clone(&other.directions),
             false => check_directions(spec.modes.high).into(),
         };
-        let (sampler, scales) = (Arc::clone(&other.sampler), Arc::clone(&other.scales));
-        let Spec { perturbation, seed, .. } = *spec;
-        let drawn = drawn(spec);
-        let sizes = Sizes::of(spec);
-        Ok(Family { sampler, law, perturbation, seed, drawn, sizes, directions, scales, ..other.clone() })
+        Ok(Family { spec: without_lists(spec), law, sizes: Sizes::of(spec), directions, ..other.clone() })
     }
 
     /// Does the same as [`Family::new`] for a spec with the same shape as `other`, and another number of points; or for
@@ -299,7 +283,7 @@ impl Family {
 
     /// Whether members are curves through points, rather than these themselves.
     pub(crate) fn has_outlines(&self) -> bool {
-        self.sampler.outline().is_some() && self.sampling != Sampling::Points
+        self.sampler.outline().is_some() && self.spec.sampling != Sampling::Points
     }
 
     /// Whether the curve of member `index` has a variation, as outlines can have.
@@ -326,14 +310,6 @@ impl Family {
     /// The outlines of the members, if they are read from files: that of member j is the one at j modulo their number.
     pub fn outlines(&self) -> &[Labelled] {
         self.curves.outlines()
-    }
-
-    /// The same with their sizes.
-    pub(crate) fn outline_set(&self) -> Option<&Arc<OutlineSet>> {
-        match &self.curves {
-            Curves::Outlines(curves) => Some(&curves.set),
-            _ => None,
-        }
     }
 
     /// The outline of member `index`, if it is read from a file.
@@ -371,11 +347,11 @@ impl Family {
     pub fn member(&self, index: u64) -> Result<Member> {
         let MemberCurve { own, factor, flow, forcing, stretch } = self.own_curve(index)?;
         let sampler =
-            own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.sampling, self.points())).transpose()?;
+            own.as_ref().map(|own| Sampler::new(own.curve.clone(), self.spec.sampling, self.points())).transpose()?;
         let own = own.as_ref().unwrap_or(&self.outline_curve);
         let sampler = sampler.as_ref().unwrap_or(&self.sampler);
         let stretched = stretch.map(|stretch| stretch.of(sampler.curve(), &factor));
-        let stretched = stretched.map(|curve| Sampler::new(curve, self.sampling, self.points())).transpose()?;
+        let stretched = stretched.map(|curve| Sampler::new(curve, self.spec.sampling, self.points())).transpose()?;
         let mut nodes = match &stretched {
             Some(sampler) => sampler.sample(&RadialFactor::default()),
             None => sampler.sample(&factor),
@@ -398,7 +374,7 @@ impl Family {
         let coefficients = self.feature_coefficients(&factor);
         let outline = self.outline(index);
         let label = outline.map_or(String::new(), |outline| outline.label.clone());
-        let group = outline.zip(self.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
+        let group = outline.zip(self.spec.group_by.as_deref()).map_or(String::new(), |(outline, property)| {
             outline.property(property).filter(|value| !value.is_empty()).map_or(NO_GROUP.into(), Cow::into_owned)
         });
         let given_excess = own.given_excess(&factor).filter(|_| stretched.is_none());
@@ -441,7 +417,7 @@ impl Family {
         };
         let forcing = values.as_ref().map(|values| values.forcing);
         // Points that are nodes are moved as such.
-        let sizes = self.sizes.filter(|sizes| !sizes.are_kept() || self.sampling != Sampling::Points);
+        let sizes = self.sizes.filter(|sizes| !sizes.are_kept() || self.spec.sampling != Sampling::Points);
         let own_reduced = values.as_ref().and_then(|values| values.reduced_area).map(Sizes::ReducedArea);
         let reduced = own_reduced.or(sizes).and_then(|sizes| Some((sizes.reduced_area()?, sizes)));
         let curve = own.as_ref().map_or_else(|| self.sampler.curve(), |own: &OutlineCurve| &own.curve);
@@ -455,16 +431,13 @@ impl Family {
 
     /// The first coefficients of a member's perturbation. Where others are perturbed, a member that is not has zeros.
     fn feature_coefficients(&self, factor: &RadialFactor) -> Vec<DVec2> {
-        let Modes { low, high } = self.law.modes();
-        let some = !self.law.is_none() || self.drawn.as_ref().is_some_and(|spec| spec.is_perturbed());
-        let modes = if some { ((high - low) as usize + 1).min(FEATURE_MODES) } else { 0 };
         let own = factor.coefficients().map(|(_, wave)| wave);
-        own.chain(repeat(DVec2::ZERO)).take(modes).collect()
+        own.chain(repeat(DVec2::ZERO)).take(self.spec.feature_modes().len()).collect()
     }
 
     /// The numbers that are drawn for member `index`, with their names: see [`Spec::drawn_numbers`].
     pub fn drawn(&self, index: u64) -> Vec<(String, f64)> {
-        self.drawn.as_ref().map_or(Vec::new(), |spec| spec.drawn_numbers(index))
+        self.spec.drawn_numbers(index)
     }
 
     /// The coefficients of cos mθ and sin mθ in the perturbation of member `index`, with m.
@@ -478,7 +451,7 @@ impl Family {
 
     /// The values of member `index`, if each has its own.
     fn values(&self, index: u64) -> Result<Option<MemberValues<'_>>> {
-        self.drawn.as_ref().map(|spec| spec.values(index)).transpose()
+        self.spec.has_drawn_values().then(|| self.spec.values(index)).transpose()
     }
 
     /// The law of the perturbation of a member with these values.
@@ -491,7 +464,7 @@ impl Family {
         if law.is_none() {
             return Ok(RadialFactor::default());
         }
-        let draws = (0..MAX_ATTEMPTS).map(|attempt| self.draw(law, Stream::new(self.seed, index, attempt)));
+        let draws = (0..MAX_ATTEMPTS).map(|attempt| self.draw(law, Stream::new(self.spec.seed, index, attempt)));
         draws.into_iter().find(|factor| factor.is_embedding(&self.directions)).ok_or_else(|| {
             let problem = format!("member {index} has no positive radius in {MAX_ATTEMPTS} draws");
             Error::value("amplitude", law.amplitude(), &problem, "lower --amplitude or raise --decay")
@@ -510,7 +483,7 @@ impl Family {
             let normals = DVec2::new(stream.normal(2 * m), stream.normal(2 * m + 1));
             law.deviation(m) * FRAC_1_SQRT_2 * normals
         };
-        match self.perturbation {
+        match self.spec.perturbation {
             Perturbation::AmplitudePhase => {
                 RadialFactor::new(modes.low, (modes.low..=modes.high).map(amplitude_and_phase))
             }
@@ -526,10 +499,8 @@ fn law(spec: &Spec) -> Result<RadialLaw> {
     RadialLaw::new(*spec.amplitude.typical(), spec.modes, *spec.decay.typical())
 }
 
-/// The spec, without its lists, if members have values of their own.
-fn drawn(spec: &Spec) -> Option<Arc<Spec>> {
-    let short = || Spec { only: None, snapshots: Vec::new(), ..spec.clone() };
-    spec.has_drawn_values().then(|| Arc::new(short()))
+fn without_lists(spec: &Spec) -> Arc<Spec> {
+    Arc::new(Spec { only: None, snapshots: Vec::new(), ..spec.clone() })
 }
 
 impl Curves {
@@ -539,11 +510,6 @@ impl Curves {
             _ => &[],
         }
     }
-}
-
-/// The size of the curve of each of [`Spec::probes`].
-fn scales(spec: &Spec) -> Result<Arc<[CurveScale]>> {
-    spec.probes().iter().map(|values| scale(values.shape.resolve()?)).collect()
 }
 
 /// Checks `--points` against the file's own number of points; the default counts as not given.

@@ -37,7 +37,7 @@ const SPREAD: f64 = 16.0 * KNOTS * KNOTS * KNOTS * KNOTS;
 const FINE: usize = 8;
 /// Rounds before giving up.
 const MAX_ROUNDS: u32 = 400;
-/// Least samples by which the excess of an outline is measured.
+/// Least samples by which a curve is measured.
 const SAMPLES: usize = 4096;
 
 /// Another curve of the same outline, by which a time is judged.
@@ -82,8 +82,7 @@ impl OutlineCurve {
     pub(super) fn given_excess(&self, factor: &RadialFactor) -> Option<f64> {
         let given = self.given.as_ref().filter(|given| given.is_simple())?;
         let centre = self.curve.centroid();
-        let mut points: Vec<DVec2> = given.subdivision(SAMPLES).map(|(_, p)| factor.apply(centre, p)).collect();
-        points.pop();
+        let points = samples(given, |point| factor.apply(centre, point));
         let (length, area) = (polygon::length(&points), polygon::signed_area(&points));
         Some(length * length / (4.0 * PI * area) - 1.0).filter(|excess| *excess > 0.0)
     }
@@ -130,6 +129,13 @@ impl Treatment {
             Variation::TwiceTheRadius => self.rounding > 0.0 && corners > 0,
         }
     }
+}
+
+/// Points of a curve by which it is measured, each `moved`.
+pub(super) fn samples(curve: &BaseCurve, moved: impl Fn(DVec2) -> DVec2) -> Vec<DVec2> {
+    let mut points: Vec<DVec2> = curve.subdivision(SAMPLES).map(|(_, point)| moved(point)).collect();
+    points.pop();
+    points
 }
 
 /// The curve with corners rounded to a radius of at least `share` of its length, and the relative change of area that

@@ -28,7 +28,7 @@ impl Outlines {
     /// # Errors
     /// [`Error::Request`] for everything that [`Shape::outlines_from`] refuses.
     pub(crate) fn read(spec: &Spec, base: &Path, known: &Outlines) -> Result<Outlines> {
-        let swept = spec.sweep.axes().iter().filter(|axis| axis.key == "shape").flat_map(|axis| &axis.values);
+        let swept = spec.sweep.axis("shape").into_iter().flat_map(|axis| &axis.values);
         // Other values are refused with their cell, later.
         let swept: Vec<Drawn<Shape>> = swept.filter_map(|value| value.as_str()?.parse().ok()).collect();
         let shapes = if swept.is_empty() { vec![&spec.shape] } else { swept.iter().collect() };
@@ -52,17 +52,6 @@ impl Outlines {
             outlines.sets.push((shape.clone(), set.into()));
         }
         Ok(outlines)
-    }
-
-    /// Those of all these shapes.
-    pub(crate) fn of_shapes<'a>(sets: impl Iterator<Item = (&'a Shape, &'a Arc<OutlineSet>)>) -> Outlines {
-        let mut outlines = Outlines::default();
-        for (shape, set) in sets {
-            if outlines.of(shape).is_none() {
-                outlines.sets.push((shape.clone(), Arc::clone(set)));
-            }
-        }
-        outlines
     }
 
     /// Whether there are none.

@@ -15,10 +15,9 @@ use curvelax_base::{
 use curvelax_curve::{BaseCurve, RadialFactor, polygon};
 use curvelax_flow::forcing::{Conserved, Forcing};
 
+use super::outline_curve::samples;
 use crate::Spec;
 
-/// Samples by which a curve is measured.
-const SAMPLES: usize = 4096;
 /// The largest |s|: e² is the ratio of the axes for s = 1.
 const MOST: f64 = 6.0;
 const HALVINGS: u32 = 80;
@@ -103,13 +102,10 @@ impl Sizes {
     fn refused(self, problem: &str, remedy: &str) -> Error {
         match self {
             Sizes::ReducedArea(reduced) => Error::value("reduced-area", number(reduced), problem, remedy),
-            Sizes::Kept(conserved, [area, length]) => {
-                let numbers = match conserved {
-                    Conserved::Area => number(area),
-                    Conserved::Length => number(length),
-                    Conserved::AreaAndLength => format!("{},{}", number(area), number(length)),
-                };
-                Error::value("conserve-at", numbers, problem, remedy)
+            Sizes::Kept(_, kept) => {
+                // The other one is 0.
+                let numbers: Vec<String> = kept.into_iter().filter(|kept| *kept != 0.0).map(number).collect();
+                Error::value("conserve-at", numbers.join(","), problem, remedy)
             }
         }
     }
@@ -173,9 +169,7 @@ impl Stretch {
         factor: &RadialFactor,
         index: u64,
     ) -> Result<Option<Stretch>> {
-        let mut points: Vec<DVec2> =
-            curve.subdivision(SAMPLES).map(|(_, point)| factor.apply(curve.centroid(), point)).collect();
-        points.pop();
+        let points = samples(curve, |point| factor.apply(curve.centroid(), point));
         if polygon::turning_number(&points).abs() != 1 {
             return Err(sizes.refused("a curve that is not simple has no reduced area", "use another --shape"));
         }

@@ -1,5 +1,5 @@
 use super::*;
-use curvelax_curve::crossing;
+use curvelax_curve::{Modes, crossing};
 
 fn spec(shape: &str, sampling: Sampling, points: usize, amplitude: f64) -> Spec {
     Spec { shape: shape.parse().unwrap(), sampling, points, amplitude: amplitude.into(), ..Spec::default() }

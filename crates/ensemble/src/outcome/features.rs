@@ -88,7 +88,7 @@ impl Spec {
     }
 
     /// Modes of the perturbation whose coefficients are features.
-    fn feature_modes(&self) -> Vec<u32> {
+    pub(crate) fn feature_modes(&self) -> Vec<u32> {
         let Modes { low, high } = self.modes;
         if self.is_perturbed() { (low..=high).take(FEATURE_MODES).collect() } else { Vec::new() }
     }

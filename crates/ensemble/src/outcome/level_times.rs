@@ -29,10 +29,8 @@ pub struct LevelTimes {
 #[derive(Clone, Copy, Debug)]
 struct AtLevel {
     member: u64,
-    /// Its relaxation time, NaN if it has none.
-    t_relax: f64,
-    /// When it vanished, likewise.
-    t_vanish: f64,
+    /// The time of each [`EndTime`], NaN if it has none.
+    ends: [f64; 2],
     /// Largest turn of the tangent at a node of the initial curve.
     turn: f64,
     /// Length of the initial curve.
@@ -81,16 +79,9 @@ impl EndTime {
     }
 }
 
-/// A time at consecutive levels, at each of which it is known.
+/// A time at consecutive levels, ascending, at each of which it is known: with the numbers in which it was computed.
 #[derive(Default)]
-struct Ladder {
-    /// The levels, ascending.
-    levels: Vec<RefinementLevel>,
-    /// The time at each.
-    times: Vec<f64>,
-    /// The numbers in which each was computed.
-    precisions: Vec<Precision>,
-}
+struct Ladder(Vec<(RefinementLevel, (f64, Precision))>);
 
 impl Ladder {
     /// The longest ladder that ends at `top`; empty if the time is not known there.
@@ -98,9 +89,12 @@ impl Ladder {
         let down = std::iter::successors(Some(top), |level| level.coarser());
         let mut known: Vec<_> = down.map_while(|level| Some((level, at(level)?))).collect();
         known.reverse();
-        let (levels, at): (_, Vec<_>) = known.into_iter().unzip();
-        let (times, precisions) = at.into_iter().unzip();
-        Ladder { levels, times, precisions }
+        Ladder(known)
+    }
+
+    /// The finest level.
+    fn finest(&self) -> Option<RefinementLevel> {
+        self.0.last().map(|(level, _)| *level)
     }
 
     /// What it tells of the time `own` at the nodes of `spec`, at which a value is `reached`, judged as `of`, with the
@@ -108,7 +102,8 @@ impl Ladder {
     /// none if the ladder is too short, does not have these nodes, the time is 0 at some of its levels only, or tends
     /// below 0.
     fn limit(self, spec: &Spec, own: f64, finest: &AtLevel, of: EndTime, reached: TimeOf) -> Option<Limit> {
-        let Ladder { levels, times, precisions } = self;
+        let (levels, at): (Vec<_>, Vec<_>) = self.0.into_iter().unzip();
+        let (times, precisions): (Vec<_>, Vec<_>) = at.into_iter().unzip();
         let own_level = levels.iter().position(|level| *level == RefinementLevel::FULL)?;
         // What holds at the start, with more nodes, too, does so with any number of them.
         if times[own_level..].iter().chain([&own]).all(|t| *t == 0.0) {
@@ -177,8 +172,8 @@ impl LevelTimes {
         }
         let LevelRow { member, turn, length_start: length, excess_start: excess, precision, .. } = *row;
         let way = ((row.energy_start - row.energy_end) / row.energy_end).abs();
-        let [t_relax, t_vanish] = [row.t_relax, row.t_vanish].map(|t| t.unwrap_or(f64::NAN));
-        own.push(AtLevel { member, t_relax, t_vanish, turn, length, excess, way, precision });
+        let ends = [row.t_relax, row.t_vanish].map(|t| t.unwrap_or(f64::NAN));
+        own.push(AtLevel { member, ends, turn, length, excess, way, precision });
         self.events[rank].extend(row.events.iter().map(|t| t.unwrap_or(f64::NAN)));
         Ok(())
     }
@@ -207,7 +202,7 @@ impl LevelTimes {
         let Some(finest) = self.at(top, member) else { return false };
         EndTime::ALL.into_iter().any(|of| {
             let ladder = Ladder::up_to(top, |level| self.time(of, level, member));
-            let is_later = ladder.times.last().is_some_and(|t| *t > 0.0);
+            let is_later = ladder.0.last().is_some_and(|(_, (t, _))| *t > 0.0);
             let own = self.time(of, RefinementLevel::FULL, member).filter(|(own, _)| *own > 0.0);
             let Some((own, _)) = own.filter(|_| is_later) else { return false };
             // The member has not run itself, so the error of its steps is not known; nodes do not take it away.
@@ -222,7 +217,7 @@ impl LevelTimes {
         let (member, count) = (outcome.member, outcome.events.len());
         let of_event = |(place, own): (usize, &Option<f64>)| {
             let ladder = self.ladder(|level| self.event_time(level, member, [place, count]));
-            let finest = self.at(*ladder.levels.last()?, member)?;
+            let finest = self.at(ladder.finest()?, member)?;
             let reached = spec.event.get(place)?.condition.observable.time_of();
             ladder.limit(spec, (*own)?, finest, EndTime::Relaxation, reached)
         };
@@ -252,7 +247,7 @@ impl LevelTimes {
     /// how much the time moves with corners rounded to twice the radius.
     fn limit(&self, spec: &Spec, member: u64, own: Option<f64>, of: EndTime) -> Option<(Limit, RefinementLevel)> {
         let ladder = self.ladder(|level| self.time(of, level, member));
-        let level = *ladder.levels.last()?;
+        let level = ladder.finest()?;
         let finest = self.at(level, member)?;
         let mut limit = ladder.limit(spec, own?, finest, of, TimeOf::End)?;
         let by_radius = self.moved_by(member, Variation::TwiceTheRadius, of).unwrap_or_default();
@@ -263,8 +258,8 @@ impl LevelTimes {
 
     /// The finest level at which a time of a member is known, if it is at its own nodes.
     fn finest(&self, member: u64, of: EndTime) -> Option<RefinementLevel> {
-        let levels = self.ladder(|level| self.time(of, level, member).filter(|(t, _)| *t > 0.0)).levels;
-        levels.last().copied().filter(|_| levels.contains(&RefinementLevel::FULL))
+        let ladder = self.ladder(|level| self.time(of, level, member).filter(|(t, _)| *t > 0.0));
+        ladder.finest().filter(|_| ladder.0.iter().any(|(level, _)| *level == RefinementLevel::FULL))
     }
 
     /// By how much a variation of its outline moves a time of a member, at its finest level; unknown if it did not
@@ -293,10 +288,7 @@ impl LevelTimes {
     /// A time of a member, and the numbers in which it was computed.
     fn time(&self, of: EndTime, level: RefinementLevel, member: u64) -> Option<(f64, Precision)> {
         let at = self.at(level, member)?;
-        let t = match of {
-            EndTime::Relaxation => at.t_relax,
-            EndTime::Vanishing => at.t_vanish,
-        };
+        let t = at.ends[of as usize];
         t.is_finite().then_some((t, at.precision))
     }
 

@@ -30,11 +30,11 @@ const LATEST: f64 = 1e300;
 const EXACT: f64 = 1e-4;
 
 /// A resolution at which members run besides their own, by its step from 1: step l of n nodes has n·2^((l - 3)/2).
-/// Variations of outlines run at the same ones.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Variations of outlines run at the same ones, after them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct RefinementLevel {
-    step: u32,
     variation: Option<Variation>,
+    step: u32,
 }
 
 /// Numbers of the levels of one variation, and of the members as they are.
@@ -142,9 +142,7 @@ impl RefinementLevel {
             (spec.solver, spec.order) = (SolverChoice::Only(Solver::Direct), Order::Coloured);
             (spec.tolerance, spec.sor, spec.max_sweeps) = (None, None, Spec::default().max_sweeps);
         }
-        let Spec { only, shard, .. } = spec.clone();
-        let spec = Spec { only: None, shard: None, ..spec }.validate()?;
-        Ok(Spec { only, shard, ..spec })
+        spec.validate_alone()
     }
 }
 

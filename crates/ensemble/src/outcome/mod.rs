@@ -1,12 +1,10 @@
 //! The result of a member: its status, its times, and its observables at the start and the end.
 
-mod ended;
 mod features;
 mod level_times;
 pub mod levels;
 pub mod linear_rate;
-pub mod rows;
-mod run_progress;
+pub mod progress;
 mod sink;
 mod wulff;
 
@@ -16,12 +14,10 @@ use serde::{Deserialize, Serialize};
 pub use curvelax_flow::scheme::Status;
 use curvelax_flow::scheme::member::Observed;
 use curvelax_statistics::Limit;
-pub use ended::Ended;
 pub use features::{Feature, Features};
 pub use level_times::LevelTimes;
 pub use levels::{LevelRow, RefinementLevel};
-pub use rows::{Extent, Rows};
-pub use run_progress::{Paused, RunProgress};
+pub use progress::{Ended, Extent, Paused, Rows, RunProgress};
 pub use sink::{Sink, SinkRequest};
 pub use wulff::{wulff_distance, wulff_outline};
 

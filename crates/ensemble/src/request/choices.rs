@@ -2,7 +2,11 @@
 
 use std::{fmt, marker::PhantomData, str::FromStr};
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{
+    Deserialize, Deserializer, Serialize,
+    de::{self, Error, Unexpected, value::SeqAccessDeserializer},
+};
+use toml::Value;
 
 use curvelax_backend::DeviceKind;
 use curvelax_base::{error::echo, text};
@@ -30,25 +34,22 @@ impl From<DeviceKind> for BackendChoice {
 }
 
 /// The requested solver.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum SolverChoice {
     /// Gauss–Seidel with a fixed τ, as in the paper; the direct solver with adaptive steps, because sweeps get more
     /// numerous as steps grow.
     Auto,
     /// This one.
+    #[serde(untagged)]
     Only(Solver),
 }
 
 impl SolverChoice {
     /// Names in flags and files: `auto`, then the solvers.
     pub const NAMES: [&str; 1 + Solver::NAMES.len()] = {
-        let mut names = ["auto"; 1 + Solver::NAMES.len()];
-        let mut i = 0;
-        while i < Solver::NAMES.len() {
-            names[1 + i] = Solver::NAMES[i];
-            i += 1;
-        }
-        names
+        let [one, other] = Solver::NAMES;
+        ["auto", one, other]
     };
 }
 
@@ -58,21 +59,11 @@ impl From<Solver> for SolverChoice {
     }
 }
 
-impl Serialize for SolverChoice {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            SolverChoice::Auto => serializer.serialize_str(SolverChoice::NAMES[0]),
-            SolverChoice::Only(solver) => solver.serialize(serializer),
-        }
-    }
-}
-
 impl<'de> Deserialize<'de> for SolverChoice {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let name = String::deserialize(deserializer)?;
-        match name == SolverChoice::NAMES[0] {
-            true => Ok(SolverChoice::Auto),
-            false => Solver::named(&name, &SolverChoice::NAMES).map(SolverChoice::Only),
+        match &*String::deserialize(deserializer)? {
+            "auto" => Ok(SolverChoice::Auto),
+            name => Solver::named(name, &SolverChoice::NAMES).map(SolverChoice::Only),
         }
     }
 }
@@ -89,60 +80,38 @@ pub enum PositionForm {
     Auto,
 }
 
-/// The fixed time step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tau {
-    /// τ itself.
-    Step(f64),
-    /// From each member's own relaxation time.
+/// A number, or that which suits each member's own relaxation time or the stiffness of each system.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrAuto {
+    /// The one that suits.
     Auto,
+    /// This one.
+    #[serde(untagged)]
+    Number(f64),
 }
 
 /// How time is cut into steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
     /// Steps of one length.
-    Fixed(Tau),
+    Fixed(OrAuto),
     /// Extrapolated steps with this local error tolerance.
     Adaptive(f64),
 }
 
-/// ω of the redistribution.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Omega {
-    /// ω itself, in 1/time.
-    Rate(f64),
-    /// From each member's own relaxation time.
-    Auto,
-}
-
 /// When a member ends at the latest.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum FinalTime {
-    /// At this time.
-    At(f64),
     /// When it is relaxed, or at the time that its cell's curve gives as a cap.
     Auto,
+    /// At this time.
+    #[serde(untagged)]
+    At(f64),
     /// For each cell of a sweep at its own time.
+    #[serde(untagged)]
     OfCells(Vec<f64>),
-}
-
-/// κ of the metric pull.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pull {
-    /// κ itself, in 1/time; 0 is the paper's scheme.
-    Rate(f64),
-    /// κ from each member's own relaxation time.
-    Auto,
-}
-
-/// ω_SOR of the sweeps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sor {
-    /// The factor itself; 1 is the paper's.
-    Factor(f64),
-    /// From the stiffness of each system.
-    Auto,
 }
 
 /// How snapshots are stored.
@@ -171,71 +140,49 @@ impl Tables {
     }
 }
 
-/// Reads and writes `$kind` as a number, `$kind::$number`, or as the word `auto`.
-macro_rules! number_or_auto {
-    ($kind:ident, $number:ident) => {
-        impl FromStr for $kind {
-            type Err = String;
-
-            fn from_str(text: &str) -> Result<$kind, String> {
-                match text.trim() {
-                    "auto" => Ok($kind::Auto),
-                    text => text
-                        .parse()
-                        .map($kind::$number)
-                        .map_err(|_| format!("`{}` is neither a number nor `auto`", echo(text))),
-                }
-            }
-        }
-
-        impl fmt::Display for $kind {
-            fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-                match self {
-                    $kind::$number(number) => write!(f, "{}", text::number(*number)),
-                    $kind::Auto => write!(f, "auto"),
-                }
-            }
-        }
-
-        impl FromNumbers for $kind {
-            fn from_numbers(_: Vec<f64>) -> Option<$kind> {
-                None
-            }
-        }
-
-        impl From<f64> for $kind {
-            fn from(number: f64) -> $kind {
-                $kind::$number(number)
-            }
-        }
-
-        impl Serialize for $kind {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                match self {
-                    $kind::$number(number) => serializer.serialize_f64(*number),
-                    $kind::Auto => serializer.serialize_str("auto"),
-                }
-            }
-        }
-
-        impl<'de> Deserialize<'de> for $kind {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<$kind, D::Error> {
-                deserializer.deserialize_any(OrAuto(PhantomData))
-            }
-        }
-    };
+/// Parses a number in the place of which `auto` is allowed, too.
+fn beside_auto(word: &str) -> Result<f64, String> {
+    let word = word.trim();
+    word.parse().map_err(|_| format!("`{}` is neither a number nor `auto`", echo(word)))
 }
 
-number_or_auto!(Tau, Step);
-number_or_auto!(Omega, Rate);
-number_or_auto!(Pull, Rate);
-number_or_auto!(Sor, Factor);
+impl FromStr for OrAuto {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<OrAuto, String> {
+        if text.trim() == "auto" { Ok(OrAuto::Auto) } else { beside_auto(text).map(OrAuto::Number) }
+    }
+}
+
+impl fmt::Display for OrAuto {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            OrAuto::Auto => f.write_str("auto"),
+            OrAuto::Number(number) => f.write_str(&text::number(*number)),
+        }
+    }
+}
+
+impl From<f64> for OrAuto {
+    fn from(number: f64) -> OrAuto {
+        OrAuto::Number(number)
+    }
+}
+
+impl<'de> Deserialize<'de> for OrAuto {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<OrAuto, D::Error> {
+        read(deserializer, OR_AUTO, |value| match value {
+            Value::String(text) => Some(text.parse()),
+            value => number(value).map(|number| Ok(number.into())),
+        })
+    }
+}
 
 impl fmt::Display for FinalTime {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            FinalTime::At(t) => write!(f, "{}", text::number(*t)),
             FinalTime::Auto => write!(f, "auto"),
+            FinalTime::At(t) => write!(f, "{}", text::number(*t)),
             FinalTime::OfCells(times) => {
                 let (low, high) =
                     times.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(*t), high.max(*t)));
@@ -250,14 +197,12 @@ impl FromStr for FinalTime {
 
     /// Parses a time, `auto`, or a list of times with commas between them.
     fn from_str(text: &str) -> Result<FinalTime, String> {
-        let number = |word: &str| {
-            let number = word.trim().parse::<f64>();
-            number.map_err(|_| format!("`{}` is neither a number nor `auto`", echo(word.trim())))
-        };
         match text.trim() {
             "auto" => Ok(FinalTime::Auto),
-            list if list.contains(',') => list.split(',').map(number).collect::<Result<_, _>>().map(FinalTime::OfCells),
-            word => number(word).map(FinalTime::At),
+            list if list.contains(',') => {
+                list.split(',').map(beside_auto).collect::<Result<_, _>>().map(FinalTime::OfCells)
+            }
+            word => beside_auto(word).map(FinalTime::At),
         }
     }
 }
@@ -268,67 +213,48 @@ impl From<f64> for FinalTime {
     }
 }
 
-impl Serialize for FinalTime {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        match self {
-            FinalTime::At(t) => serializer.serialize_f64(*t),
-            FinalTime::Auto => serializer.serialize_str("auto"),
-            FinalTime::OfCells(times) => times.serialize(serializer),
-        }
-    }
-}
-
 impl<'de> Deserialize<'de> for FinalTime {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<FinalTime, D::Error> {
-        deserializer.deserialize_any(OrAuto(PhantomData))
+        read(deserializer, OR_AUTO, |value| match value {
+            Value::String(text) => Some(text.parse()),
+            Value::Array(times) => Some(numbers(times).map(FinalTime::OfCells)),
+            value => number(value).map(|t| Ok(t.into())),
+        })
     }
 }
 
-/// Kinds that may also be read from a list of numbers.
-trait FromNumbers: Sized {
-    /// The kind with these numbers, if it can have several.
-    fn from_numbers(numbers: Vec<f64>) -> Option<Self>;
+const OR_AUTO: &str = "a number or \"auto\"";
+
+/// Reads a value of a file by `meaning`, which is none for what is not `expected`.
+pub(super) fn read<'de, D: Deserializer<'de>, T>(
+    deserializer: D,
+    expected: &str,
+    meaning: impl FnOnce(&Value) -> Option<Result<T, String>>,
+) -> Result<T, D::Error> {
+    let value = Value::deserialize(deserializer)?;
+    let found = match &value {
+        Value::String(text) => Unexpected::Str(text),
+        Value::Integer(number) => Unexpected::Signed(*number),
+        Value::Float(number) => Unexpected::Float(*number),
+        Value::Boolean(truth) => Unexpected::Bool(*truth),
+        Value::Array(_) => Unexpected::Seq,
+        Value::Table(_) | Value::Datetime(_) => Unexpected::Map,
+    };
+    meaning(&value).ok_or_else(|| D::Error::invalid_type(found, &expected))?.map_err(D::Error::custom)
 }
 
-impl FromNumbers for FinalTime {
-    fn from_numbers(numbers: Vec<f64>) -> Option<FinalTime> {
-        Some(FinalTime::OfCells(numbers))
-    }
+/// The numbers in a list.
+fn numbers(list: &[Value]) -> Result<Vec<f64>, String> {
+    list.iter().map(|value| number(value).ok_or_else(|| format!("expected a number, found {value}"))).collect()
 }
 
-struct OrAuto<T>(PhantomData<T>);
-
-impl<'de, T: From<f64> + FromStr<Err = String> + FromNumbers> de::Visitor<'de> for OrAuto<T> {
-    type Value = T;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "a number or \"auto\"")
-    }
-
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<T, E> {
-        Ok(number.into())
-    }
-
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<T, E> {
-        Ok((number as f64).into())
-    }
-
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<T, E> {
-        Ok((number as f64).into())
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<T, E> {
-        text.parse().map_err(E::custom)
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<T, A::Error> {
-        let mut numbers = Vec::new();
-        while let Some(number) = items.next_element()? {
-            numbers.push(number);
-        }
-        T::from_numbers(numbers).ok_or_else(|| de::Error::invalid_type(de::Unexpected::Seq, &"a number or \"auto\""))
-    }
+/// The number that a value of a file or a sweep is.
+pub(super) fn number(value: &Value) -> Option<f64> {
+    value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64))
 }
+
+/// What a list is in a file.
+const LIST: &str = "an array of numbers, or numbers with commas between them in quotes";
 
 /// Reads a list: a TOML array, or the comma-separated text of a flag.
 pub(super) fn list<'de, D, T>(deserializer: D) -> Result<Vec<T>, D::Error>
@@ -336,71 +262,45 @@ where
     D: Deserializer<'de>,
     T: Deserialize<'de> + FromStr,
 {
-    deserializer.deserialize_any(ListVisitor { takes_one: false, of: PhantomData })
+    deserializer.deserialize_any(ListVisitor(PhantomData))
 }
 
 /// Reads a list that may be absent.
-pub(super) fn some_list<'de, D, T>(deserializer: D) -> Result<Option<Vec<T>>, D::Error>
-where
-    D: Deserializer<'de>,
-    T: Deserialize<'de> + FromStr,
-{
+pub(super) fn some_list<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<u64>>, D::Error> {
     list(deserializer).map(Some)
 }
 
-/// Reads a list that may be absent, and of which one number is that number, so that it can be swept.
+/// Reads a few numbers that may be absent, and of which one may stand alone, so that it can be swept.
 pub(super) fn some_numbers<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Vec<f64>>, D::Error> {
-    deserializer.deserialize_any(ListVisitor { takes_one: true, of: PhantomData }).map(Some)
+    let all = read(deserializer, LIST, |value| match value {
+        Value::String(text) => Some(parsed(text)),
+        Value::Array(items) => Some(numbers(items)),
+        value => number(value).map(|number| Ok(vec![number])),
+    });
+    all.map(Some)
 }
 
-struct ListVisitor<T> {
-    takes_one: bool,
-    of: PhantomData<T>,
-}
-
-impl<T: FromStr> ListVisitor<T> {
-    /// A number alone.
-    fn alone<E: de::Error>(self, found: de::Unexpected, text: &str) -> Result<Vec<T>, E> {
-        match text.parse() {
-            Ok(number) if self.takes_one => Ok(vec![number]),
-            _ => Err(E::invalid_type(found, &"an array of numbers, or numbers with commas between them in quotes")),
-        }
-    }
-}
+/// Each item with its place, should it be wrong.
+struct ListVisitor<T>(PhantomData<T>);
 
 impl<'de, T: Deserialize<'de> + FromStr> de::Visitor<'de> for ListVisitor<T> {
     type Value = Vec<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        write!(f, "an array of numbers, or numbers with commas between them in quotes")
+        f.write_str(LIST)
     }
 
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Vec<T>, E> {
-        self.alone(de::Unexpected::Float(number), &number.to_string())
+    fn visit_seq<A: de::SeqAccess<'de>>(self, items: A) -> Result<Vec<T>, A::Error> {
+        Vec::deserialize(SeqAccessDeserializer::new(items))
     }
 
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Vec<T>, E> {
-        self.alone(de::Unexpected::Signed(number), &number.to_string())
+    fn visit_str<E: Error>(self, text: &str) -> Result<Vec<T>, E> {
+        parsed(text).map_err(E::custom)
     }
+}
 
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Vec<T>, E> {
-        self.alone(de::Unexpected::Unsigned(number), &number.to_string())
-    }
-
-    fn visit_seq<A: de::SeqAccess<'de>>(self, mut items: A) -> Result<Vec<T>, A::Error> {
-        let mut list = Vec::new();
-        while let Some(item) = items.next_element()? {
-            list.push(item);
-        }
-        Ok(list)
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Vec<T>, E> {
-        let item = |word: &str| {
-            word.trim()
-                .parse()
-                .map_err(|_| E::custom(format!("`{}` in `{}` is not a number of this list", echo(word), echo(text))))
-        };
-        text.split(',').map(item).collect()
-    }
+/// Parses numbers with commas between them.
+fn parsed<T: FromStr>(text: &str) -> Result<Vec<T>, String> {
+    let wrong = |word: &str| format!("`{}` in `{}` is not a number of this list", echo(word), echo(text));
+    text.split(',').map(|word| word.trim().parse().map_err(|_| wrong(word))).collect()
 }

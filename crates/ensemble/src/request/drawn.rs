@@ -3,9 +3,12 @@
 //! Such a value is a *template*: text with distributions in it. A number for each gives text without any, which is read
 //! as ever, so that shapes and flows know nothing of distributions. Numbers print to read back exactly.
 
-use std::{fmt, marker::PhantomData, str::FromStr, sync::Arc};
+use std::{fmt, str::FromStr, sync::Arc};
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use toml::Value;
+
+use super::choices::{number, read};
 
 use curvelax_base::{
     error::echo,
@@ -20,18 +23,22 @@ use curvelax_flow::{
 };
 
 /// What may be drawn.
-pub trait Drawable: Clone + PartialEq + fmt::Display + Serialize {
+pub trait Drawable: Clone + PartialEq + fmt::Display + Serialize + FromStr<Err: fmt::Display> {
     /// What a value in a file is.
-    const EXPECTED: &'static str;
+    const EXPECTED: &'static str = "a string";
 
     /// Reads a value without distributions.
     ///
     /// # Errors
     /// A message.
-    fn read(text: &str) -> Result<Self, String>;
+    fn read(text: &str) -> Result<Self, String> {
+        text.parse().map_err(|error: Self::Err| error.to_string())
+    }
 
     /// The value that a number is, if it is one.
-    fn of_number(number: f64) -> Option<Self>;
+    fn of_number(_: f64) -> Option<Self> {
+        None
+    }
 
     /// Whether `text` is a value that is no number, of those that may be one.
     fn is_text(_: &str) -> bool {
@@ -56,17 +63,9 @@ impl Drawable for f64 {
     }
 }
 
+impl Drawable for Flow {}
+
 impl Drawable for Shape {
-    const EXPECTED: &'static str = "a string";
-
-    fn read(text: &str) -> Result<Shape, String> {
-        text.parse()
-    }
-
-    fn of_number(_: f64) -> Option<Shape> {
-        None
-    }
-
     /// Names of files have parentheses of their own.
     fn has_distributions(text: &str) -> bool {
         text.contains('(') && !text.starts_with("file:")
@@ -75,10 +74,6 @@ impl Drawable for Shape {
 
 impl Drawable for Drive {
     const EXPECTED: &'static str = "a number, or text such as \"feedback:1,3.14\" or \"uniform(0.1..1)\"";
-
-    fn read(text: &str) -> Result<Drive, String> {
-        text.parse()
-    }
 
     fn of_number(number: f64) -> Option<Drive> {
         number.is_finite().then_some(Drive::Constant(number))
@@ -89,30 +84,20 @@ impl Drawable for Drive {
     }
 }
 
-/// What is text with numbers in it.
-macro_rules! drawable_text {
-    ($($kind:ident, $expected:literal, $of_number:expr;)*) => {
-        $(
-            impl Drawable for $kind {
-                const EXPECTED: &'static str = $expected;
+impl Drawable for Energy {
+    const EXPECTED: &'static str = "1, or text such as \"cos:4,0.03\"";
 
-                fn read(text: &str) -> Result<$kind, String> {
-                    text.parse()
-                }
-
-                fn of_number(number: f64) -> Option<$kind> {
-                    let of: fn(f64) -> Option<$kind> = $of_number;
-                    of(number)
-                }
-            }
-        )*
-    };
+    fn of_number(number: f64) -> Option<Energy> {
+        (number == 1.0).then(Energy::default)
+    }
 }
 
-drawable_text! {
-    Flow, "a string", |_| None;
-    Energy, "1, or text such as \"cos:4,0.03\"", |number| (number == 1.0).then(Energy::default);
-    Diffusivity, "1, or text such as \"cos:4,0.5\"", |number| (number == 1.0).then(Diffusivity::default);
+impl Drawable for Diffusivity {
+    const EXPECTED: &'static str = "1, or text such as \"cos:4,0.5\"";
+
+    fn of_number(number: f64) -> Option<Diffusivity> {
+        (number == 1.0).then(Diffusivity::default)
+    }
 }
 
 /// A value that is the same for all members, or drawn for each.
@@ -142,11 +127,6 @@ impl<T> Drawn<T> {
     pub fn is_drawn(&self) -> bool {
         self.template.is_some()
     }
-
-    /// The distributions in it, from left to right.
-    pub fn distributions(&self) -> &[Distribution] {
-        self.template.as_ref().map_or(&[], |template| &template.distributions)
-    }
 }
 
 impl<T: Drawable> Drawn<T> {
@@ -157,9 +137,23 @@ impl<T: Drawable> Drawn<T> {
     pub fn at(&self, numbers: &[f64]) -> Result<T, String> {
         self.template.as_ref().map_or_else(|| Ok(self.typical.clone()), |template| T::read(&template.at(numbers)))
     }
+}
+
+/// A [`Drawn`] value of any type.
+pub(crate) trait AnyDrawn: fmt::Display {
+    /// The distributions in it, from left to right.
+    fn distributions(&self) -> &[Distribution];
 
     /// Why a member could be refused for its value.
-    pub(crate) fn refusal(&self) -> Option<String> {
+    fn refusal(&self) -> Option<String>;
+}
+
+impl<T: Drawable> AnyDrawn for Drawn<T> {
+    fn distributions(&self) -> &[Distribution] {
+        self.template.as_ref().map_or(&[], |template| &template.distributions)
+    }
+
+    fn refusal(&self) -> Option<String> {
         refusal(&self.distributions().iter().collect::<Vec<_>>(), |numbers| self.at(numbers).err())
     }
 }
@@ -261,43 +255,14 @@ impl<T: Drawable> Serialize for Drawn<T> {
 
 impl<'de, T: Drawable> Deserialize<'de> for Drawn<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Drawn<T>, D::Error> {
-        deserializer.deserialize_any(DrawnVisitor(PhantomData))
-    }
-}
-
-struct DrawnVisitor<T>(PhantomData<T>);
-
-impl<T: Drawable> DrawnVisitor<T> {
-    fn number<E: de::Error>(self, number: f64, found: de::Unexpected) -> Result<Drawn<T>, E> {
-        T::of_number(number).map(Drawn::from).ok_or_else(|| E::invalid_type(found, &self))
-    }
-}
-
-impl<T: Drawable> de::Visitor<'_> for DrawnVisitor<T> {
-    type Value = Drawn<T>;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(T::EXPECTED)
-    }
-
-    fn visit_f64<E: de::Error>(self, number: f64) -> Result<Drawn<T>, E> {
-        self.number(number, de::Unexpected::Float(number))
-    }
-
-    fn visit_i64<E: de::Error>(self, number: i64) -> Result<Drawn<T>, E> {
-        self.number(number as f64, de::Unexpected::Signed(number))
-    }
-
-    fn visit_u64<E: de::Error>(self, number: u64) -> Result<Drawn<T>, E> {
-        self.number(number as f64, de::Unexpected::Unsigned(number))
-    }
-
-    fn visit_str<E: de::Error>(self, text: &str) -> Result<Drawn<T>, E> {
-        // A number in quotes is a mistake, as for all other keys.
-        if T::of_number(0.0).is_some() && !T::has_distributions(text) && !T::is_text(text) {
-            return Err(E::invalid_type(de::Unexpected::Str(text), &self));
-        }
-        text.parse().map_err(E::custom)
+        read(deserializer, T::EXPECTED, |value| match value {
+            // A number in quotes is a mistake, as for all other keys.
+            Value::String(text) if T::of_number(0.0).is_some() && !T::has_distributions(text) && !T::is_text(text) => {
+                None
+            }
+            Value::String(text) => Some(text.parse()),
+            value => Some(Ok(T::of_number(number(value)?)?.into())),
+        })
     }
 }
 

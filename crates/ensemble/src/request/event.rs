@@ -98,16 +98,7 @@ impl Observable {
 
     /// Its value.
     pub fn of(self, at: &Observed<f64>) -> f64 {
-        match self {
-            Observable::Length => at.length,
-            Observable::Area => at.area,
-            Observable::Excess => at.excess,
-            Observable::Energy => at.energy,
-            Observable::MinCurvature => at.k_min,
-            Observable::MaxCurvature => at.k_max,
-            Observable::MeshRatio => at.mesh_ratio,
-            Observable::MetricDrift => at.metric_drift,
-        }
+        at.to_numbers()[self as usize]
     }
 
     /// What a time is at which it reaches a value.

@@ -3,14 +3,13 @@
 //! A new key is a line of the table below. Flags, their help, docs/flags.md, the keywords of Python and the swept keys
 //! follow; [`Spec::validate`] checks its range, and whoever needs its value asks the [`Spec`].
 
-use std::fmt;
+use std::{fmt, sync::LazyLock};
 
 use serde::{Deserialize, Serialize};
 
 use super::{
     choices::{
-        BackendChoice, FinalTime, Omega, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau, list, some_list,
-        some_numbers,
+        BackendChoice, FinalTime, OrAuto, PositionForm, SolverChoice, Store, Tables, list, some_list, some_numbers,
     },
     drawn::Drawn,
     event::Event,
@@ -34,11 +33,11 @@ use curvelax_flow::{
 #[derive(Debug)]
 pub struct SpecKey {
     /// Its name in spec files, which is that of its flag.
-    pub name: &'static str,
+    pub name: String,
     /// What stands for its value in the help.
     pub value: &'static str,
     /// The heading of the help under which it stands.
-    pub heading: HelpHeading,
+    pub heading: &'static str,
     /// What it does, over several lines, with its default in brackets at the end.
     help: &'static str,
     /// What its flag takes.
@@ -58,55 +57,41 @@ impl SpecKey {
     }
 }
 
-/// A heading of the help.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum HelpHeading {
+/// The headings of the help.
+pub mod heading {
     /// Which curves.
-    Ensemble,
+    pub const ENSEMBLE: &str = "Ensemble";
     /// How they move, and when they count as relaxed.
-    Evolution,
+    pub const EVOLUTION: &str = "Evolution";
     /// How that is computed.
-    Method,
+    pub const METHOD: &str = "Method";
     /// Where.
-    Machine,
+    pub const MACHINE: &str = "Machine";
     /// What is written.
-    Output,
+    pub const OUTPUT: &str = "Output";
 }
 
-impl HelpHeading {
-    /// The heading.
-    pub const fn name(self) -> &'static str {
-        match self {
-            HelpHeading::Ensemble => "Ensemble",
-            HelpHeading::Evolution => "Evolution",
-            HelpHeading::Method => "Method",
-            HelpHeading::Machine => "Machine",
-            HelpHeading::Output => "Output",
-        }
-    }
+/// What the flag of a key takes, by the type of its field.
+fn takes<T: Value>(_: fn(&Spec) -> &T) -> Takes {
+    T::TAKES
 }
 
-/// `group_by` as `group-by`.
-const fn hyphenated<const N: usize>(name: &str) -> [u8; N] {
-    let mut bytes = [0; N];
-    let mut i = 0;
-    while i < N {
-        let byte = name.as_bytes()[i];
-        bytes[i] = if byte == b'_' { b'-' } else { byte };
-        i += 1;
-    }
-    bytes
+/// Reads a word as the value of a key, or a part of it, by the type of its field.
+fn check<T: Value>(word: &str, _: fn(&Spec) -> &T) -> Result<(), String> {
+    T::read(word).map(drop)
 }
 
-/// Defines the spec, its default, and [`Spec::KEYS`] from a table with lines `key: TYPE = DEFAULT, "VALUE", GROUP;`
-/// whose comments are the help. `or "TEXT"` is the value of a flag without one. What is no key follows.
+/// Defines the spec, its default, and [`Spec::table`] from a table with lines `key: TYPE = DEFAULT, "VALUE", HEADING;`
+/// whose comments are the help. A `key?: TYPE` has no value unless it is given. `or "TEXT"` is the value of
+/// a flag without one. What is no key follows.
 macro_rules! keys {
     (
         $(#[$of_spec:meta])*
         pub struct $spec:ident {
             $(
                 $(#[doc = $help:literal])+ $(#[serde($($serde:tt)*)])?
-                $key:ident: $type:ty = $default:expr, $value:literal, $group:ident $(, or $missing:literal)?;
+                $key:ident $(?: $some:ty)? $(: $type:ty = $default:expr)?,
+                $value:literal, $heading:ident $(, or $missing:literal)?;
             )*
         }
         besides {
@@ -115,37 +100,38 @@ macro_rules! keys {
     ) => {
         $(#[$of_spec])*
         pub struct $spec {
-            $($(#[doc = $help])+ $(#[serde($($serde)*)])? pub $key: $type,)*
+            $(
+                $(#[doc = $help])+ $(#[serde($($serde)*)])?
+                $(#[serde(skip_serializing_if = "Option::is_none")] pub $key: Option<$some>,)?
+                $(pub $key: $type,)?
+            )*
             $($(#[doc = $about])+ #[serde(skip)] pub $other: $other_type,)*
         }
 
         impl Default for $spec {
             fn default() -> $spec {
-                $spec { $($key: $default,)* $($other: $other_default,)* }
+                $spec { $($key: $(None::<$some>)? $($default)?,)* $($other: $other_default,)* }
             }
         }
 
         impl $spec {
             /// The keys, in the order of the spec.
-            pub const KEYS: &[SpecKey] = &[$(SpecKey {
-                name: {
-                    const NAME: [u8; stringify!($key).len()] = hyphenated(stringify!($key));
-                    match std::str::from_utf8(&NAME) {
-                        Ok(name) => name,
-                        Err(_) => unreachable!(),
-                    }
-                },
+            pub fn table() -> &'static [SpecKey] {
+                static TABLE: LazyLock<Vec<SpecKey>> = LazyLock::new(|| vec![$(SpecKey {
+                name: stringify!($key).replace('_', "-"),
                 value: $value,
-                heading: HelpHeading::$group,
+                heading: heading::$heading,
                 help: concat!($($help, "\n",)+),
-                takes: <$type as Value>::TAKES,
-                missing: (&[$($missing)?] as &[&'static str]).first().copied(),
-                check: |word| <$type as Value>::read(word).map(drop),
+                takes: takes(|spec| &spec.$key),
+                missing: [$($missing)?].first().copied(),
+                check: |word| check(word, |spec| &spec.$key),
                 set: |spec, words| {
-                    Value::put(&mut spec.$key, <$type as Value>::of(words)?);
+                    Value::put(&mut spec.$key, Value::of(words)?);
                     Ok(())
                 },
-            }),*];
+            }),*]);
+            &TABLE
+        }
         }
     };
 }
@@ -160,198 +146,171 @@ keys! {
     pub struct Spec {
         /// Number of members. For outlines, the number of copies of each, perturbed by --amplitude; without the flag,
         /// several outlines, or files:PATTERN, run once each, unperturbed [default: 256]
-        curves: u64 = 256, "COUNT", Ensemble;
+        curves: u64 = 256, "COUNT", ENSEMBLE;
         /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        outlines: Option<u64> = None, "COUNT", Ensemble;
+        outlines?: u64, "COUNT", ENSEMBLE;
         /// Compare the outlines by the values of this property of their features, column of their table, or `file`
         /// [default: no groups]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        group_by: Option<String> = None, "PROPERTY", Ensemble;
+        group_by?: String, "PROPERTY", ENSEMBLE;
         /// Nodes per member, n ≥ 6 [default: 100]
-        points: usize = 100, "N", Ensemble;
+        points: usize = 100, "N", ENSEMBLE;
         /// Seed of the random perturbations [default: 1]
         #[serde(with = "seed")]
-        seed: u64 = 1, "SEED", Ensemble;
+        seed: u64 = 1, "SEED", ENSEMBLE;
         /// Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the
         /// outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are
         /// relative to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below
         /// [default: ellipse:2,1]
-        shape: Drawn<Shape> = Shape::Ellipse { a: 2.0, b: 1.0 }.into(), "SHAPE", Ensemble;
+        shape: Drawn<Shape> = Shape::Ellipse { a: 2.0, b: 1.0 }.into(), "SHAPE", ENSEMBLE;
         /// Placement of the nodes on the curve [default: arclength]
-        sampling: Sampling = Sampling::Arclength, "HOW", Ensemble;
+        sampling: Sampling = Sampling::Arclength, "HOW", ENSEMBLE;
         /// How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline
         /// with corners where the direction turns by more than half a radian [default: auto]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        interpolate: Option<Interpolation> = None, "HOW", Ensemble;
+        interpolate?: Interpolation, "HOW", ENSEMBLE;
         /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
         /// leaves them to the nodes [default: 0.002]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        rounding: Option<f64> = None, "SHARE", Ensemble;
+        rounding?: f64, "SHARE", ENSEMBLE;
         /// Size σ of the random perturbation, 0 for none; or a distribution [default: 0.05]
-        amplitude: Drawn<f64> = 0.05.into(), "SIGMA", Ensemble;
+        amplitude: Drawn<f64> = 0.05.into(), "SIGMA", ENSEMBLE;
         /// Modes of the random perturbation [default: 2..=8]
-        modes: Modes = Modes { low: 2, high: 8 }, "LO..=HI", Ensemble;
+        modes: Modes = Modes { low: 2, high: 8 }, "LO..=HI", ENSEMBLE;
         /// Power p: mode m has standard deviation σ m^-p; or a distribution [default: 1]
-        decay: Drawn<f64> = 1.0.into(), "P", Ensemble;
+        decay: Drawn<f64> = 1.0.into(), "P", ENSEMBLE;
         /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi
         /// A/L^2, 0.05 to 1; or a distribution. Needs --conserve area,length [default: as it is]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        reduced_area: Option<Drawn<f64>> = None, "V", Ensemble;
+        reduced_area?: Drawn<f64>, "V", ENSEMBLE;
         /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of
         /// cos and sin with the same power [default: amplitude-phase]
         #[serde(skip_serializing_if = "Perturbation::is_default")]
-        perturbation: Perturbation = Perturbation::default(), "LAW", Ensemble;
+        perturbation: Perturbation = Perturbation::default(), "LAW", ENSEMBLE;
         /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity,
         /// --drive, --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a
         /// Latin hypercube. The modes of the perturbation stay random [default: random]
         #[serde(skip_serializing_if = "Design::is_random")]
-        design: Design = Design::default(), "DESIGN", Ensemble;
+        design: Design = Design::default(), "DESIGN", ENSEMBLE;
         /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions
         /// [default: surface-diffusion]
-        flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", Evolution;
+        flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", EVOLUTION;
         /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG]
         /// is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any
         /// number may be a distribution. --energy 1 is isotropic, but in the geometric form [default: 1]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        energy: Option<Drawn<Energy>> = None, "GAMMA", Evolution;
+        energy?: Drawn<Energy>, "GAMMA", EVOLUTION;
         /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
         /// DEG), above 0 in all directions; a sum of two as for --energy [default: 1]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        diffusivity: Option<Drawn<Diffusivity>> = None, "M", Evolution;
+        diffusivity?: Drawn<Diffusivity>, "M", EVOLUTION;
         /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
         /// diffusion has R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any
         /// number may be a distribution [default: 0]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        drive: Option<Drawn<Drive>> = None, "F", Evolution;
+        drive?: Drawn<Drive>, "F", EVOLUTION;
         /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
         /// vesicle: it is relaxed when its energy stays within --relax-to of its largest distance from its end
         /// [default: neither]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        conserve: Option<Conserved> = None, "WHAT", Evolution;
+        conserve?: Conserved, "WHAT", EVOLUTION;
         /// The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are
         /// scaled to it, and for both first stretched as by --reduced-area [default: those of the polygon at the start]
-        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_numbers")]
-        conserve_at: Option<Vec<f64>> = None, "A,L", Evolution;
+        #[serde(deserialize_with = "some_numbers")]
+        conserve_at?: Vec<f64>, "A,L", EVOLUTION;
         /// Mobility B in length^4/time; for surface diffusion, D_s gamma Omega^2 nu/(k_B T). All times, in flags and in
         /// results, are then in its unit of time [default: 1]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        mobility: Option<f64> = None, "B", Evolution;
+        mobility?: f64, "B", EVOLUTION;
         /// Names of the units of length and time, such as um,h, for the report and the axes [default: none]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        units: Option<Units> = None, "LENGTH,TIME", Evolution;
+        units?: Units, "LENGTH,TIME", EVOLUTION;
         /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        tau: Option<Tau> = None, "TAU", Evolution;
+        tau?: OrAuto, "TAU", EVOLUTION;
         /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL
         /// before SPEC.toml [default: off]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        adaptive: Option<f64> = None, "TOL", Evolution, or "0.001";
+        adaptive?: f64, "TOL", EVOLUTION, or "0.001";
         /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear
         /// theory predicts for its cell; if --drive makes it vanish, when it has. T1,T2,...: one for each cell of a
         /// sweep [default: 2]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        t_end: Option<FinalTime> = None, "T", Evolution;
+        t_end?: FinalTime, "T", EVOLUTION;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
         /// [default: 1 with --tau, auto with --adaptive and --tau auto]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        omega: Option<Omega> = None, "OMEGA", Evolution;
+        omega?: OrAuto, "OMEGA", EVOLUTION;
         /// Move nodes along the normal only [default: false]
-        no_redistribution: bool = false, "BOOL", Evolution;
+        no_redistribution: bool = false, "BOOL", EVOLUTION;
         /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of
         /// the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
-        pull: Pull = Pull::Rate(0.0), "KAPPA", Method;
+        pull: OrAuto = OrAuto::Number(0.0), "KAPPA", METHOD;
         /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the
         /// force of the polygon itself, which halves the error of smooth, well resolved curves and fails for others;
         /// auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        form: Option<PositionForm> = None, "FORM", Method;
+        form?: PositionForm, "FORM", METHOD;
         /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default:
         /// auto]
-        solver: SolverChoice = SolverChoice::Auto, "SOLVER", Method;
+        solver: SolverChoice = SolverChoice::Auto, "SOLVER", METHOD;
         /// Order in which a Gauss-Seidel sweep visits the nodes. coloured: all nodes of one colour at once, as a GPU
         /// needs it; lexicographic: one after another [default: coloured]
-        order: Order = Order::Coloured, "ORDER", Method;
+        order: Order = Order::Coloured, "ORDER", METHOD;
         /// Tolerance at which Gauss-Seidel sweeps stop: it bounds the residual, or in adaptive steps in f32 the change
         /// by a round of sweeps [default: 1e-5 in f64; in f32 1e-3, with --adaptive 1e-6]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        tolerance: Option<f64> = None, "TOL", Method;
+        tolerance?: f64, "TOL", METHOD;
         /// Over-relaxation factor of Gauss-Seidel sweeps. 1 is the paper's; auto follows the stiffness of each system
         /// [default: 1; auto with --adaptive]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        sor: Option<Sor> = None, "FACTOR", Method;
+        sor?: OrAuto, "FACTOR", METHOD;
         /// Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled` [default: 200000]
-        max_sweeps: u32 = 200_000, "COUNT", Method;
+        max_sweeps: u32 = 200_000, "COUNT", METHOD;
         /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
-        backend: BackendChoice = BackendChoice::Auto, "WHERE", Machine;
+        backend: BackendChoice = BackendChoice::Auto, "WHERE", MACHINE;
         /// GPU adapter to use: part of its name, or its number in `curvelax adapters` [default: the best]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        adapter: Option<String> = None, "NAME", Machine;
+        adapter?: String, "NAME", MACHINE;
         /// Number type [default: f64 where the device has it]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        precision: Option<Precision> = None, "TYPE", Machine;
+        precision?: Precision, "TYPE", MACHINE;
         /// Count a member as relaxed at this fraction of its initial excess, or of the energy of a vesicle (--conserve)
         /// [default: 0.01]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        relax_to: Option<f64> = None, "FRACTION", Evolution;
+        relax_to?: f64, "FRACTION", EVOLUTION;
         /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of
         /// --relax-to. Use it for rough outlines [default: off]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        relax_at: Option<f64> = None, "EXCESS", Evolution;
+        relax_at?: f64, "EXCESS", EVOLUTION;
         /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there. Vesicles (--conserve
         /// area,length) run to the final time [default: false; with --t-end auto true]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        stop_when_relaxed: Option<bool> = None, "BOOL", Evolution;
+        stop_when_relaxed?: bool, "BOOL", EVOLUTION;
         /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n
         /// → ∞: columns t_limit, t_error, order and points of summary.csv; with --drive t_vanish, too: t_vanish_limit
         /// and t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to 1600 nodes
         /// [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
-        refine: bool = false, "BOOL", Evolution;
+        refine: bool = false, "BOOL", EVOLUTION;
         /// With --refine or --accurate: choose n, the tolerance and the number of members so that the 95 % interval of
         /// the median t_limit, for sampling and discretisation together, is within X times the median. For outlines,
         /// whose number is given: n and the tolerance so that each t_error is within X times t_limit. It starts from
         /// --curves, --points and --adaptive. If X cannot be reached, the run keeps its best result and exits with code
         /// 3 [default: off]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        accuracy: Option<f64> = None, "X", Evolution;
+        accuracy?: f64, "X", EVOLUTION;
         /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL.
         /// A level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
         /// (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments).
         /// For several events give it several times: --event 'convex = k_min >= 0' --event 'slow = excess <= 0.5 *
         /// start' [default: none]
         #[serde(skip_serializing_if = "Vec::is_empty")]
-        event: Vec<Event> = Vec::new(), "NAME=CONDITION", Output;
+        event: Vec<Event> = Vec::new(), "NAME=CONDITION", OUTPUT;
         /// Write series.csv: one row per member every DT [default: off]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        series: Option<f64> = None, "DT", Output;
+        series?: f64, "DT", OUTPUT;
         /// Write snapshots.csv: all nodes at these times [default: off]
         #[serde(deserialize_with = "list")]
-        snapshots: Vec<f64> = Vec::new(), "T1,T2,...", Output;
+        snapshots: Vec<f64> = Vec::new(), "T1,T2,...", OUTPUT;
         /// Format of the snapshots: the table snapshots.csv, or the arrays of snapshots.zarr, for xarray
         /// [default: csv]
-        store: Store = Store::Csv, "HOW", Output;
+        store: Store = Store::Csv, "HOW", OUTPUT;
         /// Format of the tables: CSV, or Parquet next to the CSV files, which the other commands read [default: csv]
         #[serde(skip_serializing_if = "Tables::is_csv")]
-        tables: Tables = Tables::Csv, "HOW", Output;
+        tables: Tables = Tables::Csv, "HOW", OUTPUT;
         /// Run only these members; each is bit-identical to its run in the whole ensemble [default: all]
-        #[serde(skip_serializing_if = "Option::is_none", deserialize_with = "some_list")]
-        only: Option<Vec<u64>> = None, "J1,J2,...", Ensemble;
+        #[serde(deserialize_with = "some_list")]
+        only?: Vec<u64>, "J1,J2,...", ENSEMBLE;
         /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array
         /// [default: all]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        shard: Option<Shard> = None, "I/N", Ensemble;
+        shard?: Shard, "I/N", ENSEMBLE;
         /// Threads that make and evaluate members and, on the CPU, advance them [default: all cores]
-        #[serde(skip_serializing_if = "Option::is_none")]
-        threads: Option<usize> = None, "COUNT", Machine;
+        threads?: usize, "COUNT", MACHINE;
         /// Draw member j of every cell from the same random numbers [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
-        common_random_numbers: bool = false, "BOOL", Ensemble;
+        common_random_numbers: bool = false, "BOOL", ENSEMBLE;
         /// Vary this key: a cell of members for each value, and for each combination if the flag is given for several
         /// keys. Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default:
         /// none]
         #[serde(skip_serializing_if = "Sweep::is_empty")]
-        sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", Ensemble;
+        sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", ENSEMBLE;
     }
     besides {
         /// Highest order of adaptive steps; if absent, that of the precision. Only the study of work and precision sets
@@ -365,7 +324,7 @@ keys! {
 impl Spec {
     /// Names of all keys, in order.
     pub fn keys() -> Vec<String> {
-        Self::KEYS.iter().map(|key| key.name.to_owned()).collect()
+        Self::table().iter().map(|key| key.name.clone()).collect()
     }
 }
 

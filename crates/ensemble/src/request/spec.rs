@@ -12,8 +12,8 @@ use curvelax_base::error::{Error, Result, echo, expected_of, shortened};
 use curvelax_curve::Interpolation;
 
 pub use crate::request::{
-    choices::{BackendChoice, FinalTime, Omega, Pace, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
-    key::{HelpHeading, OmittedKeys, Spec, SpecKey},
+    choices::{BackendChoice, FinalTime, OrAuto, Pace, PositionForm, SolverChoice, Store, Tables},
+    key::{OmittedKeys, Spec, SpecKey, heading},
     units::Units,
 };
 use curvelax_flow::forcing::Conserved;
@@ -52,10 +52,10 @@ impl Spec {
             (self.adaptive, self.tau) = (Some(DEFAULT_ADAPTIVE), None);
         }
         if is_free("pull") {
-            self.pull = Pull::Auto;
+            self.pull = OrAuto::Auto;
         }
         if is_free("omega") {
-            self.omega = Some(Omega::Auto);
+            self.omega = Some(OrAuto::Auto);
         }
         if is_free("t-end") {
             self.t_end = Some(FinalTime::Auto);
@@ -77,20 +77,15 @@ impl Spec {
         let Spec { snapshots, only, sweep, .. } = self;
         let short = Spec { sweep: Sweep::default(), snapshots: Vec::new(), only: None, ..self.clone() };
         let mut table = toml::Table::try_from(short).map_err(|e| failed(&e))?;
-        for (axis, value) in sweep.axes().iter().zip(sweep.values(index)) {
-            // Keys that replace each other.
-            match axis.key.as_str() {
-                "tau" => drop(table.remove("adaptive")),
-                "adaptive" => drop(table.remove("tau")),
-                "relax-to" => drop(table.remove("relax-at")),
-                "relax-at" => drop(table.remove("relax-to")),
-                _ => {}
+        for (key, value) in sweep.of_cell(index) {
+            if let Some(other) = sweep::replaced_by(key) {
+                table.remove(other);
             }
-            table.insert(axis.key.clone(), value.clone());
+            table.insert(key.to_owned(), value.clone());
             // One key at a time, so that the message names the wrong one.
             Spec::deserialize(table.clone()).map_err(|e| {
-                let (key, value) = (&axis.key, echo(sweep::label(value)));
-                Error::Request(format!("--sweep {key}={value}: {}", expected_of(e.message().trim_end())))
+                let (value, expected) = (echo(sweep::label(value)), expected_of(e.message().trim_end()));
+                Error::Request(format!("--sweep {key}={value}: {expected}"))
             })?;
         }
         let mut spec = Spec::deserialize(table).map_err(|e| failed(&e))?;
@@ -192,8 +187,8 @@ impl Spec {
     /// Whether it gives no number as a time or a rate: all of them may then be chosen by the size of the curve.
     pub(crate) fn gives_no_times(&self) -> bool {
         let Spec { tau, t_end, omega, pull, series, snapshots, .. } = self;
-        let times = matches!(tau, Some(Tau::Step(_))) || !matches!(t_end, None | Some(FinalTime::Auto));
-        let rates = matches!(omega, Some(Omega::Rate(_))) || matches!(pull, Pull::Rate(rate) if *rate != 0.0);
+        let times = matches!(tau, Some(OrAuto::Number(_))) || !matches!(t_end, None | Some(FinalTime::Auto));
+        let rates = matches!(omega, Some(OrAuto::Number(_))) || matches!(pull, OrAuto::Number(rate) if *rate != 0.0);
         let swept = |key| self.sweep.has(key);
         let outputs = series.is_some() || !snapshots.is_empty();
         !(times || rates || outputs || TIMED.into_iter().any(swept))
@@ -207,13 +202,13 @@ impl Spec {
     /// Whether both area and length are kept, in any cell.
     pub fn has_vesicles(&self) -> bool {
         let both = Conserved::AreaAndLength;
-        let swept = self.sweep.axes().iter().filter(|axis| axis.key == "conserve").flat_map(SweepAxis::labels);
-        self.conserve == Some(both) || swept.into_iter().any(|value| value.parse() == Ok(both))
+        let mut swept = self.sweep.axis("conserve").into_iter().flat_map(SweepAxis::labels);
+        self.conserve == Some(both) || swept.any(|value| value.parse() == Ok(both))
     }
 
     /// Whether both are kept in cell `index` of the sweep: when such a member is relaxed is known only at its end.
     pub fn has_vesicles_in(&self, index: u64) -> bool {
-        let of_cell = self.sweep.axes().iter().zip(self.sweep.values(index)).find(|(axis, _)| axis.key == "conserve");
+        let of_cell = self.sweep.of_cell(index).find(|(key, _)| *key == "conserve");
         of_cell.map_or(self.conserve, |(_, value)| sweep::label(value).parse().ok()) == Some(Conserved::AreaAndLength)
     }
 
@@ -223,10 +218,10 @@ impl Spec {
     }
 
     /// ω in use: if none is given, the paper's where τ is a number, and otherwise each member's own.
-    pub fn omega(&self) -> Omega {
+    pub fn omega(&self) -> OrAuto {
         self.omega.unwrap_or(match self.pace() {
-            Pace::Fixed(Tau::Step(_)) => Omega::Rate(DEFAULT_OMEGA),
-            Pace::Fixed(Tau::Auto) | Pace::Adaptive(_) => Omega::Auto,
+            Pace::Fixed(OrAuto::Number(_)) => OrAuto::Number(DEFAULT_OMEGA),
+            Pace::Fixed(OrAuto::Auto) | Pace::Adaptive(_) => OrAuto::Auto,
         })
     }
 
@@ -240,11 +235,11 @@ impl Spec {
     }
 
     /// The over-relaxation in use: with fixed steps that of the paper.
-    pub fn sor(&self) -> Sor {
+    pub fn sor(&self) -> OrAuto {
         match (self.sor, self.pace()) {
             (Some(sor), _) => sor,
-            (None, Pace::Fixed(_)) => Sor::Factor(1.0),
-            (None, Pace::Adaptive(_)) => Sor::Auto,
+            (None, Pace::Fixed(_)) => OrAuto::Number(1.0),
+            (None, Pace::Adaptive(_)) => OrAuto::Auto,
         }
     }
 
@@ -314,8 +309,8 @@ mod tests {
             seed: u64::MAX,
             tau: Some(1e-300.into()),
             relax_at: Some(0.01),
-            pull: Pull::Rate(0.1),
-            omega: Some(Omega::Rate(0.1 + 0.2)),
+            pull: OrAuto::Number(0.1),
+            omega: Some(OrAuto::Number(0.1 + 0.2)),
             flow: Flow::Polynomial(vec![0.5, 0.0, -0.25]).into(),
             precision: Some(Precision::F32),
             tolerance: Some(3e-4),
@@ -330,13 +325,13 @@ mod tests {
         };
         let adaptive = Spec {
             adaptive: Some(1e-3),
-            omega: Some(Omega::Auto),
-            pull: Pull::Auto,
-            sor: Some(Sor::Auto),
+            omega: Some(OrAuto::Auto),
+            pull: OrAuto::Auto,
+            sor: Some(OrAuto::Auto),
             relax_to: Some(0.1),
             ..Spec::default()
         };
-        let own = Spec { tau: Some(Tau::Auto), t_end: Some(FinalTime::Auto), ..Spec::default() };
+        let own = Spec { tau: Some(OrAuto::Auto), t_end: Some(FinalTime::Auto), ..Spec::default() };
         let drawn = Spec {
             shape: "ellipse:uniform(1.2..3),1".parse().unwrap(),
             flow: "elastic:lognormal(0.5,0.2)".parse().unwrap(),
@@ -363,17 +358,17 @@ mod tests {
     #[test]
     fn the_redistribution_is_the_papers_where_tau_is_a_number_and_otherwise_each_members_own() {
         let omega = |text: &str| Spec::from_toml(text).unwrap().validate().unwrap().omega;
-        assert_eq!(omega(""), Some(Omega::Rate(1.0)));
-        assert_eq!(omega("adaptive = 0.01"), Some(Omega::Auto));
-        assert_eq!(omega("tau = 'auto'"), Some(Omega::Auto));
-        assert_eq!(omega("tau = 0.01"), Some(Omega::Rate(1.0)));
-        assert_eq!(omega("adaptive = 0.01\nomega = 1"), Some(Omega::Rate(1.0)));
+        assert_eq!(omega(""), Some(OrAuto::Number(1.0)));
+        assert_eq!(omega("adaptive = 0.01"), Some(OrAuto::Auto));
+        assert_eq!(omega("tau = 'auto'"), Some(OrAuto::Auto));
+        assert_eq!(omega("tau = 0.01"), Some(OrAuto::Number(1.0)));
+        assert_eq!(omega("adaptive = 0.01\nomega = 1"), Some(OrAuto::Number(1.0)));
         // Cells of a sweep choose for themselves.
         let swept = Spec::from_toml("[sweep]\nadaptive = [0.01]").unwrap().validate().unwrap();
         assert_eq!(swept.omega, None);
-        assert_eq!(swept.of_cell(0).unwrap().validate().unwrap().omega, Some(Omega::Auto));
+        assert_eq!(swept.of_cell(0).unwrap().validate().unwrap().omega, Some(OrAuto::Auto));
         let given = Spec::from_toml("omega = 2\n[sweep]\nadaptive = [0.01]").unwrap().validate().unwrap();
-        assert_eq!(given.of_cell(0).unwrap().validate().unwrap().omega, Some(Omega::Rate(2.0)));
+        assert_eq!(given.of_cell(0).unwrap().validate().unwrap().omega, Some(OrAuto::Number(2.0)));
     }
 
     #[test]

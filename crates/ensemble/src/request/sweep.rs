@@ -11,6 +11,7 @@ use serde::{
 };
 use toml::Value;
 
+use super::choices::number;
 use curvelax_base::error::{Error, Result, did_you_mean, echo, shortened};
 
 /// Keys that all members of a run have in common.
@@ -59,14 +60,18 @@ pub struct SweepAxis {
     pub values: Vec<Value>,
 }
 
+/// The key that `key` replaces.
+pub(crate) fn replaced_by(key: &str) -> Option<&'static str> {
+    let pair = EXCLUSIVE.into_iter().find(|pair| pair.contains(&key))?;
+    pair.into_iter().find(|other| *other != key)
+}
+
 /// Checks that neither the swept `key` nor one that it replaces is among the keys `given` beside the sweep.
 ///
 /// # Errors
 /// [`Error::Request`] naming the key whose value would be lost.
 pub fn check_not_given(key: &str, given: &[String]) -> Result<()> {
-    let replaced = |other: &&String| {
-        *other == key || EXCLUSIVE.iter().any(|pair| pair.contains(&key) && pair.contains(&other.as_str()))
-    };
+    let replaced = |other: &&String| *other == key || replaced_by(key) == Some(other);
     given.iter().find(replaced).map_or(Ok(()), |other| {
         Err(Error::Request(format!(
             "--sweep {key}: --{other} is given, too, and its value would be lost; leave one of them out"
@@ -96,7 +101,7 @@ impl SweepAxis {
 
     /// The values as numbers, if all of them are.
     pub fn numbers(&self) -> Option<Vec<f64>> {
-        self.values.iter().map(|value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64))).collect()
+        self.values.iter().map(number).collect()
     }
 }
 
@@ -182,9 +187,14 @@ impl Sweep {
         &self.0
     }
 
+    /// The values of `key`, if it is swept.
+    pub fn axis(&self, key: &str) -> Option<&SweepAxis> {
+        self.0.iter().find(|axis| axis.key == key)
+    }
+
     /// Whether `key` is swept.
     pub fn has(&self, key: &str) -> bool {
-        self.0.iter().any(|axis| axis.key == key)
+        self.axis(key).is_some()
     }
 
     /// Sets the values of a key; flags thus replace what the file says.
@@ -213,11 +223,20 @@ impl Sweep {
         values
     }
 
+    /// The keys with their values in cell `index`.
+    pub(crate) fn of_cell(&self, index: u64) -> impl Iterator<Item = (&str, &Value)> {
+        self.0.iter().map(|axis| &*axis.key).zip(self.values(index))
+    }
+
+    /// Names the values of cell `index`, as `key = value`, as they are `shown`.
+    fn named(&self, index: u64, shown: impl Fn(&Value) -> String) -> String {
+        let parts = self.of_cell(index).map(|(key, value)| format!("{key} = {}", shown(value)));
+        parts.collect::<Vec<_>>().join(", ")
+    }
+
     /// Names the values of cell `index`, as `key = value`.
     pub fn name(&self, index: u64) -> String {
-        let keys = self.0.iter().map(|axis| &axis.key);
-        let parts = keys.zip(self.values(index)).map(|(key, value)| format!("{key} = {}", label(value)));
-        parts.collect::<Vec<_>>().join(", ")
+        self.named(index, label)
     }
 
     /// The values of cell `index` as text for tables.
@@ -229,11 +248,10 @@ impl Sweep {
     pub(crate) fn in_cell(&self, error: Error, index: u64) -> Error {
         match error {
             // A message about a value of the sweep names it already.
-            Error::Request(message) if !self.is_empty() && !message.starts_with("--sweep ") => {
-                let keys = self.0.iter().map(|axis| &axis.key).zip(self.values(index));
-                let parts = keys.map(|(key, value)| format!("{key} = {}", shortened(&label(value), MAX_LABEL)));
-                Error::Request(format!("{message} (in the cell {})", parts.collect::<Vec<_>>().join(", ")))
-            }
+            Error::Request(message) if !self.is_empty() && !message.starts_with("--sweep ") => Error::Request(format!(
+                "{message} (in the cell {})",
+                self.named(index, |value| shortened(&label(value), MAX_LABEL))
+            )),
             error => error,
         }
     }

@@ -6,10 +6,12 @@
 mod forces;
 mod times;
 
+use std::ops::RangeInclusive;
+
 use crate::request::event::{Event, MAX_EVENTS};
 use crate::request::spec::{
-    BackendChoice, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, Omega, Order, Pace, PositionForm, Precision, Pull,
-    ROUNDINGS, Sor, Spec, Store, Tau,
+    BackendChoice, DEFAULT_RELAX_TO, DEFAULT_T_END, FinalTime, OrAuto, Order, Pace, PositionForm, Precision, ROUNDINGS,
+    Spec, Store,
 };
 use curvelax_base::{
     error::{Error, Result},
@@ -19,19 +21,19 @@ use curvelax_flow::solver::{Facts, ring::MIN_POINTS};
 
 /// More members than this are a typing error.
 const MAX_CURVES: u64 = 1_000_000_000;
-const MAX_POINTS: usize = 1_000_000;
+const MAX_POINTS: u64 = 1_000_000;
 /// A member with more steps than this would need more than a year.
 pub(crate) const MAX_STEPS: f64 = 1e9;
 /// Final times whose smallest part in a table, and whose sum over all members, can still be represented.
-const TIMES: std::ops::RangeInclusive<f64> = 1e-300..=1e300;
+const TIMES: RangeInclusive<f64> = 1e-300..=1e300;
 /// Mobilities with which times, fourth powers of lengths over them, stay finite.
-const MOBILITIES: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+const MOBILITIES: RangeInclusive<f64> = 1e-100..=1e100;
 /// Keys that are chosen for an uncertainty.
 const CHOSEN: [&str; 3] = ["points", "tau", "adaptive"];
 /// Keys with which the force of the polygon moves the nodes.
 const GEOMETRIC: [&str; 4] = ["energy", "diffusivity", "drive", "conserve"];
 /// Uncertainties of a median that members by the million, at a thousand nodes, can reach.
-const ACCURACIES: std::ops::RangeInclusive<f64> = 1e-5..=0.5;
+const ACCURACIES: RangeInclusive<f64> = 1e-5..=0.5;
 const MAX_SNAPSHOTS: usize = 10_000;
 /// The rows of a resident member stay in memory until it ends, at four numbers each.
 const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
@@ -39,8 +41,8 @@ const MAX_SNAPSHOT_ROWS: usize = 100_000_000;
 pub(crate) const MAX_OMEGA_TAU: f64 = 1.0;
 /// A sweep residual above this no longer says that a system is solved.
 const LOOSEST_TOLERANCE: f64 = 0.1;
-const MAX_SWEEPS: u32 = 100_000_000;
-const MAX_THREADS: usize = 1024;
+const MAX_SWEEPS: u64 = 100_000_000;
+const MAX_THREADS: u64 = 1024;
 
 impl Spec {
     /// Checks all ranges and combinations, and returns the spec with its lists sorted and without duplicates.
@@ -63,6 +65,12 @@ impl Spec {
         self.tidy_only()?;
         self.check_shard()?;
         Ok(self)
+    }
+
+    /// Does the same with the spec of a cell whose members, an index in the cell each, were checked with those of all.
+    pub(crate) fn validate_alone(mut self) -> Result<Spec> {
+        let (only, shard) = (self.only.take(), self.shard.take());
+        Ok(Spec { only, shard, ..self.validate()? })
     }
 
     /// Fills in the choices left open, so that a printed spec shows them.
@@ -99,45 +107,31 @@ impl Spec {
             let problem = format!("{cells}{outlines} make {members} members, too many");
             return Err(Error::value("curves", self.curves, &problem, &format!("at most {MAX_CURVES} in all")));
         }
-        if !(1..=MAX_CURVES).contains(&self.curves) {
-            let problem = if self.curves == 0 { "an ensemble needs a member" } else { "too many members" };
-            return Err(Error::value("curves", self.curves, problem, &format!("use 1 to {MAX_CURVES}")));
-        }
-        if !(MIN_POINTS..=MAX_POINTS).contains(&self.points) {
-            let problem = if self.points < MIN_POINTS { "the scheme needs 6 nodes" } else { "too many nodes" };
-            let allowed = format!("use {MIN_POINTS} to {MAX_POINTS}");
-            return Err(Error::value("points", self.points, problem, &allowed));
-        }
-        if let Some(threads) = self.threads
-            && !(1..=MAX_THREADS).contains(&threads)
-        {
-            let problem = if threads == 0 { "no thread to run on" } else { "too many threads" };
-            return Err(Error::value("threads", threads, problem, &format!("use 1 to {MAX_THREADS}")));
-        }
-        Ok(())
+        check_count("curves", self.curves, 1..=MAX_CURVES, ["an ensemble needs a member", "too many members"])?;
+        let points = MIN_POINTS as u64..=MAX_POINTS;
+        check_count("points", self.points as u64, points, ["the scheme needs 6 nodes", "too many nodes"])?;
+        let threads = self.threads.map_or(1, |threads| threads as u64);
+        check_count("threads", threads, 1..=MAX_THREADS, ["no thread to run on", "too many threads"])
     }
 
     fn check_accuracy(&self) -> Result<()> {
-        match self.accuracy {
-            Some(goal) if !self.refine => {
-                let problem = "the error of discretisation is known only with --refine";
-                Err(Error::value("accuracy", number(goal), problem, "add --accurate, or --refine"))
+        let Some(goal) = self.accuracy else { return Ok(()) };
+        let one = "leave out one of the two";
+        let (problem, allowed) = match () {
+            () if !self.refine => {
+                ("the error of discretisation is known only with --refine", "add --accurate, or --refine".into())
             }
-            Some(goal) if CHOSEN.into_iter().any(|key| self.sweep.has(key)) => {
-                let problem = "it chooses n and the steps, and a sweep of points, tau or adaptive does, too";
-                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
+            () if CHOSEN.into_iter().any(|key| self.sweep.has(key)) => {
+                ("it chooses n and the steps, and a sweep of points, tau or adaptive does, too", one.into())
             }
-            Some(goal) if self.only.is_some() => {
-                let problem = "the members are chosen by it, and --only chooses them, too";
-                Err(Error::value("accuracy", number(goal), problem, "leave out one of the two"))
-            }
-            Some(goal) if !ACCURACIES.contains(&goal) => {
+            () if self.only.is_some() => ("the members are chosen by it, and --only chooses them, too", one.into()),
+            () if !ACCURACIES.contains(&goal) => {
                 let (low, high) = (number(*ACCURACIES.start()), number(*ACCURACIES.end()));
-                let problem = "not a relative uncertainty that can be reached";
-                Err(Error::value("accuracy", number(goal), problem, &format!("use a number from {low} to {high}")))
+                ("not a relative uncertainty that can be reached", format!("use a number from {low} to {high}"))
             }
-            _ => Ok(()),
-        }
+            () => return Ok(()),
+        };
+        Err(Error::value("accuracy", number(goal), problem, &allowed))
     }
 
     fn check_mobility(&self) -> Result<()> {
@@ -153,7 +147,7 @@ impl Spec {
     }
 
     fn check_omega(&self) -> Result<()> {
-        let Omega::Rate(omega) = self.omega() else { return Ok(()) };
+        let OrAuto::Number(omega) = self.omega() else { return Ok(()) };
         if !(omega.is_finite() && omega >= 0.0) {
             let allowed = "use 0, a positive number such as 1, or auto";
             return Err(Error::value("omega", number(omega), "not a redistribution speed", allowed));
@@ -162,7 +156,7 @@ impl Spec {
             return Ok(());
         }
         match self.pace() {
-            Pace::Fixed(Tau::Step(tau)) if omega * tau > MAX_OMEGA_TAU => {
+            Pace::Fixed(OrAuto::Number(tau)) if omega * tau > MAX_OMEGA_TAU => {
                 let allowed = format!("it is a rate: use --omega {} or less", number(1.0 / tau));
                 Err(Error::value("omega", number(omega), &overshooting(omega, tau), &allowed))
             }
@@ -180,7 +174,7 @@ impl Spec {
     }
 
     fn check_pull(&self) -> Result<()> {
-        let Pull::Rate(rate) = self.pull else { return Ok(()) };
+        let OrAuto::Number(rate) = self.pull else { return Ok(()) };
         if !(rate.is_finite() && rate >= 0.0) {
             let allowed = "use 0 for the paper's scheme, a positive number, or auto";
             return Err(Error::value("pull", number(rate), "not a rate", allowed));
@@ -197,17 +191,15 @@ impl Spec {
             let allowed = format!("use a number above 0, up to {LOOSEST_TOLERANCE}, for example 1e-5");
             return Err(Error::value("tolerance", number(tolerance), "not a residual tolerance", &allowed));
         }
-        if let Some(Sor::Factor(factor)) = self.sor
+        if let Some(OrAuto::Number(factor)) = self.sor
             && !(factor > 0.0 && factor < 2.0)
         {
             let problem = "sweeps do not converge with this over-relaxation";
             let allowed = "use a number between 0 and 2, both excluded, or auto; 1 is plain Gauss-Seidel";
             return Err(Error::value("sor", number(factor), problem, allowed));
         }
-        if !(1..=MAX_SWEEPS).contains(&self.max_sweeps) {
-            let problem = if self.max_sweeps == 0 { "no sweep to solve with" } else { "too many sweeps" };
-            return Err(Error::value("max-sweeps", self.max_sweeps, problem, &format!("use 1 to {MAX_SWEEPS}")));
-        }
+        let sweeps = self.max_sweeps.into();
+        check_count("max-sweeps", sweeps, 1..=MAX_SWEEPS, ["no sweep to solve with", "too many sweeps"])?;
         let resolved = self.points / 4;
         if let Some(mode) = self.highest_mode()
             && mode as usize > resolved
@@ -284,7 +276,7 @@ impl Spec {
             (self.order != default.order).then(|| ("order", "lexicographic".to_string())),
             self.tolerance.map(|tolerance| ("tolerance", number(tolerance))),
             // Folders of earlier versions name the paper's factor whatever the solver.
-            self.sor.filter(|sor| *sor != Sor::Factor(1.0)).map(|sor| ("sor", sor.to_string())),
+            self.sor.filter(|sor| *sor != OrAuto::Number(1.0)).map(|sor| ("sor", sor.to_string())),
             (self.max_sweeps != default.max_sweeps).then(|| ("max-sweeps", self.max_sweeps.to_string())),
         ];
         let Facts { refuses, refuses_because: problem, .. } = *self.solver().facts();
@@ -322,20 +314,15 @@ impl Spec {
         self.snapshots.iter_mut().for_each(|t| *t += 0.0); // -0 becomes 0
         self.snapshots.sort_by(f64::total_cmp);
         self.snapshots.dedup();
-        if self.snapshots.len() > MAX_SNAPSHOTS {
-            let problem = "too many times";
-            return Err(Error::value(
-                "snapshots",
-                format!("({} times)", self.snapshots.len()),
-                problem,
-                &format!("at most {MAX_SNAPSHOTS}"),
-            ));
+        let (times, rows) = (self.snapshots.len(), self.snapshots.len().saturating_mul(self.points));
+        let refused =
+            |problem: &str, allowed: &str| Err(Error::value("snapshots", format!("({times} times)"), problem, allowed));
+        if times > MAX_SNAPSHOTS {
+            return refused("too many times", &format!("at most {MAX_SNAPSHOTS}"));
         }
-        let rows = self.snapshots.len().saturating_mul(self.points);
         if rows > MAX_SNAPSHOT_ROWS {
-            let problem = format!("{rows} rows per member");
             let allowed = format!("at most {MAX_SNAPSHOT_ROWS}: use fewer times, or fewer --points");
-            return Err(Error::value("snapshots", format!("({} times)", self.snapshots.len()), &problem, &allowed));
+            return refused(&format!("{rows} rows per member"), &allowed);
         }
         Ok(())
     }
@@ -378,6 +365,15 @@ pub(crate) fn tightest_adaptive(precision: Precision) -> f64 {
 /// The problem of a redistribution that is too fast for fixed steps.
 pub(crate) fn overshooting(omega: f64, tau: f64) -> String {
     format!("omega tau = {}, and the redistribution overshoots above {MAX_OMEGA_TAU}", number(omega * tau))
+}
+
+/// Checks a number of things, with what is said of too few and too many.
+fn check_count(key: &str, count: u64, allowed: RangeInclusive<u64>, [few, many]: [&str; 2]) -> Result<()> {
+    if allowed.contains(&count) {
+        return Ok(());
+    }
+    let problem = if count < *allowed.start() { few } else { many };
+    Err(Error::value(key, count, problem, &format!("use {} to {}", allowed.start(), allowed.end())))
 }
 
 fn positive(key: &str, value: f64, what: &str, example: &str) -> Result<()> {

@@ -3,7 +3,7 @@
 use serde::{Deserialize, de::value::StrDeserializer};
 
 use super::{
-    choices::{BackendChoice, FinalTime, Omega, PositionForm, Pull, SolverChoice, Sor, Store, Tables, Tau},
+    choices::{BackendChoice, FinalTime, OrAuto, PositionForm, SolverChoice, Store, Tables},
     drawn::Drawn,
     event::Event,
     shard::Shard,
@@ -98,8 +98,8 @@ macro_rules! values {
 values! { Takes::Number, whole; u32, u64, usize }
 values! { Takes::Number, real; f64 }
 values! { Takes::Number, str::parse;
-    Drawn<Diffusivity>, Drawn<Drive>, Drawn<Energy>, Drawn<Flow>, Drawn<Shape>, Drawn<f64>, FinalTime, Modes, Omega, Pull,
-    Shard, Sor, Tau,
+    Drawn<Diffusivity>, Drawn<Drive>, Drawn<Energy>, Drawn<Flow>, Drawn<Shape>, Drawn<f64>, FinalTime, Modes, OrAuto,
+    Shard,
 }
 values! { Takes::Text, str::parse; Conserved, Units }
 values! { Takes::Text, |word: &str| Ok(word.to_owned()); String }

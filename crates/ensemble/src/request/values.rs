@@ -13,7 +13,7 @@ use std::{
 
 use crate::{
     Spec,
-    request::drawn::{Drawable, Drawn, corners, refusal},
+    request::drawn::{AnyDrawn, Drawable, Drawn, corners, refusal},
 };
 use curvelax_base::{
     error::{Error, Result, echo},
@@ -22,7 +22,7 @@ use curvelax_base::{
 };
 use curvelax_curve::{RadialLaw, Shape};
 use curvelax_flow::{
-    crystal::{Crystal, Diffusivity, Energy},
+    crystal::Crystal,
     flow::Flow,
     forcing::{Conserved, Drive, Forcing},
 };
@@ -65,18 +65,7 @@ pub struct MemberValues<'a> {
 impl Spec {
     /// The values of all members; where each has its own, those at the medians of the distributions.
     pub fn typical(&self) -> MemberValues<'_> {
-        MemberValues {
-            shape: Cow::Borrowed(self.shape.typical()),
-            flow: self.law_of_motion(
-                Cow::Borrowed(self.flow.typical()),
-                self.energy.as_ref().map(|energy| *energy.typical()),
-                self.diffusivity.as_ref().map(|diffusivity| *diffusivity.typical()),
-            ),
-            forcing: self.forcing(self.drive.as_ref().map(|drive| *drive.typical())),
-            amplitude: *self.amplitude.typical(),
-            decay: *self.decay.typical(),
-            reduced_area: self.reduced_area.as_ref().map(|drawn| *drawn.typical()),
-        }
+        self.values_with(&OwnNumbers(None)).expect("the values at the medians have been read")
     }
 
     /// What acts besides the flow, with this driving force, whose time becomes that of unit mobility.
@@ -91,26 +80,12 @@ impl Spec {
         Forcing { drive, conserved: self.conserve, kept }
     }
 
-    /// The flow, with the energy and the mobility if they depend on the direction.
-    fn law_of_motion<'a>(
-        &self,
-        flow: Cow<'a, Flow>,
-        energy: Option<Energy>,
-        diffusivity: Option<Diffusivity>,
-    ) -> Cow<'a, Flow> {
-        let (energy, diffusivity) = match (energy, diffusivity) {
-            (None, None) => return flow,
-            (energy, diffusivity) => (energy.unwrap_or_default(), diffusivity.unwrap_or_default()),
-        };
-        Cow::Owned(Flow::Crystal(Crystal { energy, diffusivity }))
-    }
-
     /// The values that are drawn for `member`, an index over all cells; with common random numbers, over one.
     ///
     /// # Errors
     /// [`Error::Request`] for values that cannot be, which no member of a [study](crate::Study) has.
     pub fn values(&self, member: u64) -> Result<MemberValues<'_>> {
-        self.values_at(|of, place| self.uniform(of, member, place))
+        self.values_with(&OwnNumbers(Some(self.numbers(|of, place| self.uniform(of, member, place)))))
     }
 
     /// Those of a member with this index in a study, in its cell.
@@ -178,8 +153,8 @@ impl Spec {
             return vec![self.typical()];
         }
         let places: u32 = self.distributions().iter().map(|of_key| of_key.len() as u32).sum();
-        let tail = |place: u32, u: f64| self.values_at(|_, at| if at.coordinate == place { u } else { 0.5 });
-        let tails = (0..places).flat_map(|place| TAILS.map(|u| tail(place, u)));
+        let tail = |place: u32, u: f64| self.numbers(|_, at| if at.coordinate == place { u } else { 0.5 });
+        let tails = (0..places).flat_map(|place| TAILS.map(|u| self.values_with(&OwnNumbers(Some(tail(place, u))))));
         let members = (0..PROBED.min(self.members_per_cell())).map(|member| self.values(member));
         let probe = |values: Result<_>| values.unwrap_or_else(|_| self.typical());
         [self.typical()].into_iter().chain(tails.chain(members).map(probe)).collect()
@@ -212,40 +187,29 @@ impl Spec {
     /// Why the values of a member could be refused, if its distributions can give such values: with the flag.
     pub(crate) fn refusal(&self) -> Option<String> {
         let told = |key: &str, drawn: &dyn fmt::Display, reason| format!("--{key} {}: {reason}", echo(drawn));
-        let of_shape = || Some(told("shape", &self.shape, self.shape.refusal()?));
-        let of_flow = || Some(told("flow", &self.flow, self.flow.refusal()?));
-        let of_energy = || Some(told("energy", self.energy.as_ref()?, self.energy.as_ref()?.refusal()?));
-        let of_diffusivity =
-            || Some(told("diffusivity", self.diffusivity.as_ref()?, self.diffusivity.as_ref()?.refusal()?));
-        let of_drive = || Some(told("drive", self.drive.as_ref()?, self.drive.as_ref()?.refusal()?));
+        let all = || KEYS.into_iter().zip(self.drawn()).filter_map(|(key, drawn)| Some((key, drawn?)));
+        let of_key = all().find_map(|(key, drawn)| Some(told(key, drawn, drawn.refusal()?)));
+        // What the values of two keys say together, or their checks.
         let of_law = || {
             let [_, _, amplitude, decay, ..] = self.distributions();
             let of: Vec<&Distribution> = amplitude.iter().chain(decay).collect();
             let reason = refusal(&of, |numbers| {
                 let (first, second) = numbers.split_at(amplitude.len());
-                let law = |amplitude, decay| RadialLaw::new(amplitude, self.modes, decay).err();
-                match (self.amplitude.at(first), self.decay.at(second)) {
-                    (Ok(amplitude), Ok(decay)) => law(amplitude, decay).map(|error| error.to_string()),
-                    (Err(message), _) | (_, Err(message)) => Some(message),
-                }
+                let (amplitude, decay) = (self.amplitude.at(first).ok()?, self.decay.at(second).ok()?);
+                RadialLaw::new(amplitude, self.modes, decay).err().map(|error| error.to_string())
             });
             let drawn: (&str, &dyn fmt::Display) =
                 if amplitude.is_empty() { ("decay", &self.decay) } else { ("amplitude", &self.amplitude) };
             Some(told(drawn.0, drawn.1, reason?))
         };
-        let of_motion = of_flow().or_else(of_energy).or_else(of_diffusivity).or_else(of_drive);
-        of_shape().or(of_motion).or_else(of_law).or_else(|| self.refusal_of_reduced_area())
-    }
-
-    /// The same for the reduced area.
-    fn refusal_of_reduced_area(&self) -> Option<String> {
-        let drawn = self.reduced_area.as_ref()?;
-        let of: Vec<&Distribution> = drawn.distributions().iter().collect();
-        let reason = refusal(&of, |numbers| match drawn.at(numbers) {
-            Ok(reduced) => check_reduced_area(reduced).err().map(|error| error.to_string()),
-            Err(message) => Some(message),
-        });
-        Some(format!("--reduced-area {}: {}", echo(drawn), reason?))
+        let of_reduced_area = || {
+            let drawn = self.reduced_area.as_ref()?;
+            let reason = refusal(&drawn.distributions().iter().collect::<Vec<_>>(), |numbers| {
+                check_reduced_area(drawn.at(numbers).ok()?).err().map(|error| error.to_string())
+            });
+            Some(told("reduced-area", drawn, reason?))
+        };
+        of_key.or_else(of_law).or_else(of_reduced_area)
     }
 
     /// Checks the values of `member`, as for [`Spec::values`].
@@ -266,21 +230,20 @@ impl Spec {
         shapes.filter_map(|shape| shape.highest_mode()).max()
     }
 
+    /// The keys whose values may be drawn, in the order of [`KEYS`]: those that have a value.
+    fn drawn(&self) -> [Option<&dyn AnyDrawn>; DRAWN] {
+        fn any<T: Drawable>(key: &Option<Drawn<T>>) -> Option<&dyn AnyDrawn> {
+            key.as_ref().map(|drawn| drawn as _)
+        }
+        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, reduced_area, .. } = self;
+        let always: [&dyn AnyDrawn; 4] = [shape, flow, amplitude, decay];
+        let [shape, flow, amplitude, decay] = always.map(Some);
+        [shape, flow, amplitude, decay, any(energy), any(diffusivity), any(drive), any(reduced_area)]
+    }
+
     /// The distributions of each key.
     pub(crate) fn distributions(&self) -> [&[Distribution]; DRAWN] {
-        let Spec { shape, flow, amplitude, decay, energy, diffusivity, drive, reduced_area, .. } = self;
-        let energy = energy.as_ref().map_or(&[][..], Drawn::distributions);
-        let diffusivity = diffusivity.as_ref().map_or(&[][..], Drawn::distributions);
-        [
-            shape.distributions(),
-            flow.distributions(),
-            amplitude.distributions(),
-            decay.distributions(),
-            energy,
-            diffusivity,
-            drive.as_ref().map_or(&[][..], Drawn::distributions),
-            reduced_area.as_ref().map_or(&[][..], Drawn::distributions),
-        ]
+        self.drawn().map(|drawn| drawn.map_or(&[][..], AnyDrawn::distributions))
     }
 
     /// The uniform number of `member` at a place: drawn, or the one that gives it its own of listed values.
@@ -291,21 +254,25 @@ impl Spec {
         }
     }
 
-    fn values_at(&self, uniform: impl Fn(&Distribution, DrawAddress) -> f64) -> Result<MemberValues<'_>> {
-        let [shape, flow, amplitude, decay, energy, diffusivity, drive, reduced] = self.numbers(uniform);
-        let of_energy = self.energy.as_ref().map(|drawn| own("energy", drawn, &energy)).transpose()?;
-        let of_diffusivity =
-            self.diffusivity.as_ref().map(|drawn| own("diffusivity", drawn, &diffusivity)).transpose()?;
-        let of_drive = self.drive.as_ref().map(|drawn| own("drive", drawn, &drive)).transpose()?;
-        let of_reduced = self.reduced_area.as_ref().map(|drawn| own("reduced-area", drawn, &reduced)).transpose()?;
-        let flow = own("flow", &self.flow, &flow)?;
+    fn values_with(&self, numbers: &OwnNumbers) -> Result<MemberValues<'_>> {
+        let energy = numbers.own_of("energy", &self.energy)?;
+        let diffusivity = numbers.own_of("diffusivity", &self.diffusivity)?;
+        let drive = numbers.own_of("drive", &self.drive)?;
+        let reduced_area = numbers.own_of("reduced-area", &self.reduced_area)?;
+        let flow = match (energy, diffusivity) {
+            (None, None) => numbers.own("flow", &self.flow)?,
+            (energy, diffusivity) => {
+                let (energy, diffusivity) = (energy.unwrap_or_default(), diffusivity.unwrap_or_default());
+                Cow::Owned(Flow::Crystal(Crystal { energy, diffusivity }))
+            }
+        };
         Ok(MemberValues {
-            shape: own("shape", &self.shape, &shape)?,
-            flow: self.law_of_motion(flow, of_energy.map(|of| *of), of_diffusivity.map(|of| *of)),
-            forcing: self.forcing(of_drive.map(|of| *of)),
-            amplitude: *own("amplitude", &self.amplitude, &amplitude)?,
-            decay: *own("decay", &self.decay, &decay)?,
-            reduced_area: of_reduced.map(|of| *of),
+            shape: numbers.own("shape", &self.shape)?,
+            flow,
+            forcing: self.forcing(drive),
+            amplitude: *numbers.own("amplitude", &self.amplitude)?,
+            decay: *numbers.own("decay", &self.decay)?,
+            reduced_area,
         })
     }
 
@@ -363,13 +330,22 @@ pub(crate) fn drawn_names(counts: [usize; DRAWN]) -> Vec<String> {
     counts.into_iter().enumerate().flat_map(|(key, count)| (0..count).map(move |rank| name(key, rank))).collect()
 }
 
-/// The value of a key with these numbers.
-fn own<'a, T: Drawable>(key: &str, drawn: &'a Drawn<T>, numbers: &[f64]) -> Result<Cow<'a, T>> {
-    if !drawn.is_drawn() {
-        return Ok(Cow::Borrowed(drawn.typical()));
+/// The numbers of each key; none for the medians of all.
+struct OwnNumbers(Option<[Vec<f64>; DRAWN]>);
+
+impl OwnNumbers {
+    /// The value of a key with its own numbers.
+    fn own<'a, T: Drawable>(&self, key: &str, drawn: &'a Drawn<T>) -> Result<Cow<'a, T>> {
+        let own = self.0.iter().flat_map(|all| KEYS.iter().zip(all)).find(|(other, _)| **other == key);
+        let Some((_, numbers)) = own.filter(|_| drawn.is_drawn()) else { return Ok(Cow::Borrowed(drawn.typical())) };
+        let refused = |message: String| Error::Request(format!("--{key} {}: {message}", echo(drawn)));
+        drawn.at(numbers).map(Cow::Owned).map_err(refused)
     }
-    let refused = |message: String| Error::Request(format!("--{key} {}: {message}", echo(drawn)));
-    drawn.at(numbers).map(Cow::Owned).map_err(refused)
+
+    /// The same for a key that need not have a value.
+    fn own_of<T: Drawable + Copy>(&self, key: &str, drawn: &Option<Drawn<T>>) -> Result<Option<T>> {
+        drawn.as_ref().map(|drawn| self.own(key, drawn).map(|own| *own)).transpose()
+    }
 }
 
 /// What linear theory says about a member of a spec.

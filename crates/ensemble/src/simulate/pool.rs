@@ -44,51 +44,40 @@ impl<'a> Pool<'a> {
         queue: &mut Queue,
         sink: &mut dyn Sink,
     ) -> Result<Vec<usize>> {
+        let roster = self.roster;
         // Of few members, each frees the memory in which the next is made.
-        let at_once = if self.roster.threads.share(entering.len()) { entering.len() } else { 1 };
+        let at_once = if roster.threads.share(entering.len()) { entering.len() } else { 1 };
         let mut over = Vec::new();
         while !entering.is_empty() {
-            let part = entering.drain(..at_once).collect();
-            over.extend(self.admit_part(backend, part, queue, sink)?);
-        }
-        Ok(over)
-    }
-
-    fn admit_part(
-        &mut self,
-        backend: &mut dyn Backend,
-        entering: Vec<(usize, Entering)>,
-        queue: &mut Queue,
-        sink: &mut dyn Sink,
-    ) -> Result<Vec<usize>> {
-        let roster = self.roster;
-        let with_paused = |(slot, (rank, who))| (slot, rank, who, self.paused.remove(&rank));
-        let entering = entering.into_iter().map(with_paused).collect();
-        let admitted = roster.threads.map(entering, |(slot, rank, who, paused)| {
-            let begun = paused.is_none().then(Instant::now);
-            (slot, rank, begun, roster.admit(who, paused))
-        });
-        let (mut over, mut runs, mut failed) = (Vec::new(), Vec::new(), Ok(()));
-        for (slot, rank, begun, admitted) in admitted {
-            match admitted {
-                Ok(Admitted::Over(ended)) => {
-                    over.push(slot);
-                    queue.leave(rank, *ended, sink)?;
-                }
-                Ok(Admitted::Runs(own)) => {
-                    let (mut trajectory, run) = *own;
-                    self.held += trajectory.rows().bytes();
-                    self.resident[slot] = Some(Box::new(Resident { rank, trajectory, begun }));
-                    runs.push((slot, run));
-                }
-                Err(error) => {
-                    failed = Err(error);
-                    break;
+            let with_paused = |(slot, (rank, who))| (slot, rank, who, self.paused.remove(&rank));
+            let part = entering.drain(..at_once).map(with_paused).collect();
+            let admitted = roster.threads.map(part, |(slot, rank, who, paused)| {
+                let begun = paused.is_none().then(Instant::now);
+                (slot, rank, begun, roster.admit(who, paused))
+            });
+            let (mut runs, mut failed) = (Vec::new(), Ok(()));
+            for (slot, rank, begun, admitted) in admitted {
+                match admitted {
+                    Ok(Admitted::Over(ended)) => {
+                        over.push(slot);
+                        queue.leave(rank, *ended, sink)?;
+                    }
+                    Ok(Admitted::Runs(own)) => {
+                        let (mut trajectory, run) = *own;
+                        self.held += trajectory.rows().bytes();
+                        self.resident[slot] = Some(Box::new(Resident { rank, trajectory, begun }));
+                        runs.push((slot, run));
+                    }
+                    Err(error) => {
+                        failed = Err(error);
+                        break;
+                    }
                 }
             }
+            let loaded = backend.load_all(runs, &roster.threads);
+            failed.and(loaded)?;
         }
-        let loaded = backend.load_all(runs, &roster.threads);
-        failed.and(loaded).map(|()| over)
+        Ok(over)
     }
 
     /// Nodes of a member.
@@ -130,78 +119,68 @@ impl<'a> Pool<'a> {
         queue: &mut Queue,
         sink: &mut dyn Sink,
     ) -> Result<()> {
-        let occupied: Vec<usize> = slots.filter(|slot| self.resident[*slot].is_some()).collect();
-        occupied
-            .chunks(states_at_once(self.points()))
-            .try_for_each(|part| self.collect_part(backend, part, queue, sink))
-    }
-
-    fn collect_part(
-        &mut self,
-        backend: &mut dyn Backend,
-        slots: &[usize],
-        queue: &mut Queue,
-        sink: &mut dyn Sink,
-    ) -> Result<()> {
-        let mut wanted = Vec::new();
-        for slot in slots.iter().copied() {
-            let Some(own) = &mut self.resident[slot] else { continue };
-            let trajectory = &mut own.trajectory;
-            trajectory.observe(backend.counters(slot), &backend.report(slot));
-            if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
-                wanted.push(slot);
-            }
-        }
-        // One transfer for all.
-        let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
         let roster = self.roster;
-        let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
-        let taken: Vec<_> = slots.iter().filter_map(take).collect();
-        // Rows may take twice the memory that they fill. One after another, members free theirs for the next.
-        let room = if roster.threads.share(taken.len()) { MAX_HELD.saturating_sub(self.held) / 2 } else { 0 };
-        let each = room / taken.len().max(1);
-        let served = roster.threads.map(taken, |(slot, mut own, state)| {
-            let before = own.trajectory.rows().bytes();
-            let all = own.trajectory.serve(state.as_ref(), before + each);
-            let more = own.trajectory.rows().bytes().saturating_sub(before);
-            (slot, if all { roster.proceed(own, state.as_ref()) } else { Served::Full(own, state.map(Box::new)) }, more)
-        });
-        let (mut over, mut full) = (Vec::new(), Vec::new());
-        for (slot, served, more) in served {
-            self.held += more;
-            match served {
-                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
-                Served::Over(rank, ended) => over.push((slot, rank, ended)),
-                Served::Full(own, state) => {
-                    self.resident[slot] = Some(own);
-                    full.push((slot, state));
+        let occupied: Vec<usize> = slots.filter(|slot| self.resident[*slot].is_some()).collect();
+        for slots in occupied.chunks(states_at_once(self.points())) {
+            let mut wanted = Vec::new();
+            for slot in slots.iter().copied() {
+                let Some(own) = &mut self.resident[slot] else { continue };
+                let trajectory = &mut own.trajectory;
+                trajectory.observe(backend.counters(slot), &backend.report(slot));
+                if trajectory.wants_state() || (trajectory.is_over() && trajectory.needs_last_state()) {
+                    wanted.push(slot);
                 }
             }
-        }
-        let mut left = over.len();
-        for (slot, rank, ended) in over {
-            backend.clear(slot);
-            queue.leave(rank, *ended, sink)?;
-            left -= 1;
-            self.bound(queue, left, sink)?;
-        }
-        for (slot, state) in full {
-            let Some(mut own) = self.resident[slot].take() else { continue };
-            let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
-            // One step may pass more output times than memory has room for.
-            while !own.trajectory.serve(state.as_deref(), most) {
-                most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
-            }
-            self.held += own.trajectory.rows().bytes().saturating_sub(before);
-            match roster.proceed(own, state.as_deref()) {
-                Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
-                Served::Over(rank, ended) => {
-                    backend.clear(slot);
-                    queue.leave(rank, *ended, sink)?;
+            // One transfer for all.
+            let mut states = wanted.iter().copied().zip(backend.states(&wanted)?).collect::<BTreeMap<_, _>>();
+            let take = |slot: &usize| Some((*slot, self.resident[*slot].take()?, states.remove(slot)));
+            let taken: Vec<_> = slots.iter().filter_map(take).collect();
+            // Rows may take twice the memory that they fill. One after another, members free theirs for the next.
+            let room = if roster.threads.share(taken.len()) { MAX_HELD.saturating_sub(self.held) / 2 } else { 0 };
+            let each = room / taken.len().max(1);
+            let served = roster.threads.map(taken, |(slot, mut own, state)| {
+                let before = own.trajectory.rows().bytes();
+                let all = own.trajectory.serve(state.as_ref(), before + each);
+                let more = own.trajectory.rows().bytes().saturating_sub(before);
+                (slot, if all { Ok(roster.proceed(own, state.as_ref())) } else { Err((own, state)) }, more)
+            });
+            let (mut over, mut full) = (Vec::new(), Vec::new());
+            for (slot, served, more) in served {
+                self.held += more;
+                match served {
+                    Ok(Served::Runs(own, aim)) => self.keep(backend, slot, own, aim),
+                    Ok(Served::Over(rank, ended)) => over.push((slot, rank, ended)),
+                    // Its rows fill the memory that it has before all output times are served.
+                    Err((own, state)) => {
+                        self.resident[slot] = Some(own);
+                        full.push((slot, state));
+                    }
                 }
-                Served::Full(..) => unreachable!("all output times have been served"),
             }
-            self.bound(queue, 0, sink)?;
+            let mut left = over.len();
+            for (slot, rank, ended) in over {
+                backend.clear(slot);
+                queue.leave(rank, *ended, sink)?;
+                left -= 1;
+                self.bound(queue, left, sink)?;
+            }
+            for (slot, state) in full {
+                let Some(mut own) = self.resident[slot].take() else { continue };
+                let (before, mut most) = (own.trajectory.rows().bytes(), MAX_OF_ONE);
+                // One step may pass more output times than memory has room for.
+                while !own.trajectory.serve(state.as_ref(), most) {
+                    most = if own.trajectory.rows().spill(sink)? { MAX_OF_ONE } else { usize::MAX };
+                }
+                self.held += own.trajectory.rows().bytes().saturating_sub(before);
+                match roster.proceed(own, state.as_ref()) {
+                    Served::Runs(own, aim) => self.keep(backend, slot, own, aim),
+                    Served::Over(rank, ended) => {
+                        backend.clear(slot);
+                        queue.leave(rank, *ended, sink)?;
+                    }
+                }
+                self.bound(queue, 0, sink)?;
+            }
         }
         Ok(())
     }

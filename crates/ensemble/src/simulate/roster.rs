@@ -8,6 +8,7 @@ use crate::{
     outcome::linear_rate,
     request::spec::Precision,
     schedule::{Outputs, grid},
+    study::cell_of,
     trajectory::{Trajectory, settling_times},
 };
 use curvelax_base::{error::Result, threads::HostThreads};
@@ -32,7 +33,7 @@ impl<'a> Roster<'a> {
                 let inside = if framed { member::TIMES } else { 0 };
                 let frames: Vec<f64> = grid(spec.final_time()).skip(1).take(inside).collect();
                 let energies = settling_times(spec);
-                Outputs::with_energies(spec.final_time(), spec.series, [&spec.snapshots, &frames, &energies])
+                Outputs::new(spec.final_time(), spec.series, [&spec.snapshots, &frames, &energies])
             };
             cells.iter().map(of_cell).collect()
         };
@@ -48,7 +49,7 @@ impl<'a> Roster<'a> {
         let portrait = cell < self.portraits && own.place(index) < each as u64;
         let outputs = &self.outputs[usize::from(portrait)][cell];
         let mut trajectory = Trajectory::new(own.member(index)?, &own.spec, self.precision, outputs);
-        trajectory.keep_portrait(portrait);
+        trajectory.portrait = portrait;
         Ok(trajectory)
     }
 
@@ -66,13 +67,8 @@ impl<'a> Roster<'a> {
     /// Ends a member. What theory predicts may depend on when it relaxed.
     fn end(&self, trajectory: Trajectory, last: Option<&State<f64>>) -> Ended {
         let mut ended = trajectory.end(last);
-        // Not all cells have a level.
-        let at = self.cells.binary_search_by_key(&ended.outcome.cell, |cell| cell.index);
-        ended.outcome.rate_theory = at.ok().and_then(|at| {
-            let cell = &self.cells[at];
-            let values = cell.spec.values_of(ended.outcome.member, cell.index).ok()?;
-            linear_rate::rate_of(&cell.spec, &values, &ended.outcome)
-        });
+        let cell = cell_of(self.cells, &ended.outcome);
+        ended.outcome.rate_theory = cell.and_then(|cell| linear_rate::rate_of(&cell.spec, &ended.outcome));
         ended
     }
 
@@ -104,8 +100,6 @@ pub(super) enum Served<'a> {
     Over(u64, Box<Ended>),
     /// With another goal, if it has one.
     Runs(Box<Resident<'a>>, Option<Box<Aim>>),
-    /// Its rows fill the memory that it has before all output times are served; with its state.
-    Full(Box<Resident<'a>>, Option<Box<State<f64>>>),
 }
 
 /// A member in a slot.

@@ -2,7 +2,7 @@
 
 use crate::{
     Cell, Ended, Extent, LevelRow, LevelTimes, Outcome, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Spec,
-    outcome::levels::RefinementLevel,
+    outcome::levels::RefinementLevel, study::cell_of,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::number::Precision;
@@ -23,9 +23,8 @@ pub struct LevelSink<'a> {
 
 impl LevelSink<'_> {
     fn cell(&self, ended: &Outcome) -> Result<&Spec> {
-        let at = self.cells.binary_search_by_key(&ended.cell, |cell| cell.index);
-        let none = |_| Error::Failed(format!("member {} is of no cell that runs", ended.member));
-        at.map(|at| &self.cells[at].spec).map_err(none)
+        let none = || Error::Failed(format!("member {} is of no cell that runs", ended.member));
+        cell_of(self.cells, ended).map(|cell| &cell.spec).ok_or_else(none)
     }
 }
 

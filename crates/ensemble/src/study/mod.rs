@@ -6,11 +6,11 @@ mod stage;
 pub use level_sink::LevelSink;
 pub use stage::{Cohort, Stage};
 
-use std::{borrow::Cow, path::Path, sync::Arc};
+use std::{borrow::Cow, path::Path};
 
 use crate::{
-    Family, LevelTimes, Member, Outlines, RefinementLevel, Spec, Variation,
-    request::spec::{FinalTime, Store, Tau},
+    Family, LevelTimes, Member, Outcome, Outlines, RefinementLevel, Spec, Variation,
+    request::spec::{FinalTime, OrAuto, Store},
     theory::times,
 };
 use curvelax_base::error::{Error, Result};
@@ -24,6 +24,7 @@ pub struct Study {
     spec: Spec,
     cells: Vec<Cell>,
     stages: Vec<Stage>,
+    outlines: Outlines,
     /// Flags by which times follow the size of the curves, although the request does not have them.
     by_size: Vec<&'static str>,
 }
@@ -58,15 +59,15 @@ impl Study {
         let spec = spec.validate()?;
         let cells = cells(&spec, &outlines)?;
         if !free || !cells.iter().any(|cell| times::is_far(&cell.spec, cell.family.scales())) {
-            return Study::of_cells(spec, cells);
+            return Ok(Study { outlines, ..Study::of_cells(spec, cells)? });
         }
-        let tau = if spec.adaptive.is_some() { None } else { Some(Tau::Auto) };
+        let tau = if spec.adaptive.is_some() { None } else { Some(OrAuto::Auto) };
         let own = Spec { tau, t_end: Some(FinalTime::Auto), omega: None, ..spec }.validate()?;
         drop(cells);
         let cells = self::cells(&own, &outlines)?;
         let chosen = [("--tau auto", own.tau != given.tau), ("--t-end auto", given.t_end.is_none())];
         let by_size = chosen.into_iter().filter_map(|(flag, is_new)| is_new.then_some(flag)).collect();
-        Ok(Study { by_size, ..Study::of_cells(own, cells)? })
+        Ok(Study { outlines, by_size, ..Study::of_cells(own, cells)? })
     }
 
     /// Does the same as [`Study::new`], with members that are perturbations of `curve` instead of the shape of `spec`.
@@ -95,9 +96,8 @@ impl Study {
     }
 
     /// The outlines of its shapes that are read from files.
-    pub fn outlines(&self) -> Outlines {
-        let cells = self.cells.iter();
-        Outlines::of_shapes(cells.filter_map(|cell| Some((cell.spec.shape.typical(), cell.family.outline_set()?))))
+    pub fn outlines(&self) -> &Outlines {
+        &self.outlines
     }
 
     /// Its stages, in the order in which they run: the levels, and then its own members.
@@ -176,9 +176,8 @@ impl Study {
 
     /// Nodes of the finest level at which members may run, or of the members themselves if these have more.
     pub fn most_points(&self) -> usize {
-        let finest =
-            |cell: &Cell| cell.finer().last().copied().unwrap_or(RefinementLevel::FULL).points(cell.spec.points);
-        self.cells.iter().map(finest).max().unwrap_or(0)
+        let points = |cell: &Cell| cell.levels().into_iter().map(|level| level.points(cell.spec.points)).max();
+        self.cells.iter().filter_map(points).max().unwrap_or(0)
     }
 
     /// Nodes of a member; meaningful only if all have the same number.
@@ -225,11 +224,6 @@ impl Study {
         }
     }
 
-    /// Returns its cells.
-    pub fn into_cells(self) -> Vec<Cell> {
-        self.cells
-    }
-
     /// Its cells, mutable.
     pub fn cells_mut(&mut self) -> &mut [Cell] {
         &mut self.cells
@@ -244,17 +238,13 @@ impl Study {
             return Err(Error::value("design", spec.design.name(), problem, &remedy));
         }
         for cell in &mut cells {
-            let own = cell.settled();
-            cell.spec = own.map_err(|error| spec.sweep.in_cell(error, cell.index))?;
-            cell.check_draws().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
-            cell.check_stretch().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
-            cell.check_refinement().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
+            cell.settle().map_err(|error| spec.sweep.in_cell(error, cell.index))?;
         }
         if spec.t_end == Some(FinalTime::Auto) && !spec.sweep.is_empty() {
             spec.t_end = Some(FinalTime::OfCells(cells.iter().map(|cell| cell.spec.final_time()).collect()));
         }
         let stages = stage::stages(&cells);
-        let mut study = Study { spec, cells, stages, by_size: Vec::new() };
+        let mut study = Study { spec, cells, stages, outlines: Outlines::default(), by_size: Vec::new() };
         study.settle_spec(|_| ());
         Ok(study)
     }
@@ -283,6 +273,11 @@ pub struct Cell {
     first: u64,
 }
 
+/// The cell of a member, of some in their order.
+pub(crate) fn cell_of<'a>(cells: &'a [Cell], ended: &Outcome) -> Option<&'a Cell> {
+    cells.binary_search_by_key(&ended.cell, |cell| cell.index).ok().map(|at| &cells[at])
+}
+
 const LONG_SWEEPS: &str = "sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
                            may need tens of thousands; --solver direct needs none";
 
@@ -307,13 +302,14 @@ impl Cell {
         Cell { index: 0, spec, family, first: 0 }
     }
 
-    /// Its spec with a number as the final time, checked against the curve.
-    fn settled(&self) -> Result<Spec> {
+    /// Gives its spec a number as the final time, and checks it against the curve.
+    fn settle(&mut self) -> Result<()> {
         let scales = self.family.scales();
-        let Spec { only, shard, .. } = self.spec.clone();
-        let spec = times::settled(Spec { only: None, shard: None, ..self.spec.clone() }, scales).validate()?;
-        times::check(&spec, scales, self.family.points())?;
-        Ok(Spec { only, shard, ..spec })
+        self.spec = times::settled(self.spec.clone(), scales).validate_alone()?;
+        times::check(&self.spec, scales, self.family.points())?;
+        self.check_draws()?;
+        self.check_stretch()?;
+        self.check_refinement()
     }
 
     /// The rank of a member among those of the cell that would run without shards.
@@ -406,18 +402,16 @@ impl Cell {
         })
     }
 
-    /// The levels with more nodes at which its members may run.
-    fn finer(&self) -> Vec<RefinementLevel> {
-        RefinementLevel::finer(self.spec.points).filter(|_| self.spec.refine).collect()
-    }
-
-    /// The levels at which variations of its outlines may run.
-    fn varied(&self) -> Vec<RefinementLevel> {
-        if !self.spec.refine || !self.family.has_outlines() {
-            return Vec::new();
+    /// The levels at which its members may run, and then, where they have outlines, the variations of these.
+    fn levels(&self) -> Vec<RefinementLevel> {
+        let finer = RefinementLevel::finer(self.spec.points).filter(|_| self.spec.refine);
+        let mut levels: Vec<_> = RefinementLevel::FIRST.into_iter().chain(finer).collect();
+        if self.spec.refine && self.family.has_outlines() {
+            let fine: Vec<_> = levels.iter().copied().filter(|level| *level >= RefinementLevel::FULL).collect();
+            let varied = |variation| fine.iter().map(move |level| level.varied(variation));
+            levels.extend(Variation::ALL.into_iter().flat_map(varied));
         }
-        let plain = || [RefinementLevel::FULL].into_iter().chain(self.finer());
-        Variation::ALL.into_iter().flat_map(|variation| plain().map(move |level| level.varied(variation))).collect()
+        levels
     }
 
     /// Its members that need a selective `level`, by their times at the `levels` before it.
@@ -479,10 +473,7 @@ fn cell(spec: &Spec, outlines: &Outlines, index: u64, before: &[Cell], bytes: &m
                 let problem = format!("the curves of the first {} take more than {gigabytes} GB", index + 1);
                 return Err(Error::value("sweep", cells, &problem, "use fewer --points, or fewer cells at once"));
             }
-            match outlines.of(own.shape.typical()) {
-                Some(all) => Family::of_outlines(&own, Arc::clone(all))?,
-                None => Family::of_shape(&own)?,
-            }
+            Family::with(&own, outlines.of(own.shape.typical()))?
         }
     };
     // The number of points of a file has not been checked yet.
@@ -523,7 +514,7 @@ mod tests {
     fn cells_of_one_curve_share_it_and_have_the_members_of_cells_that_do_not() {
         let axes = ["amplitude=0.05,0.1", "modes=2..=4;2..=8", "shape=ellipse:2,1;circle:1", "seed=1,2"];
         let spec = swept(&axes, Spec { points: 48, curves: 2, ..Spec::default() });
-        let cells = Study::new(spec.clone()).unwrap().into_cells();
+        let cells = Study::new(spec.clone()).unwrap().cells;
         assert_eq!(cells.len(), 16);
         for (one, other) in cells.iter().flat_map(|one| cells.iter().map(move |other| (one, other))) {
             assert_eq!(one.family.shares_with(&other.family), one.spec.shape == other.spec.shape);
@@ -540,7 +531,7 @@ mod tests {
     #[test]
     fn sweeps_that_take_long_are_warned_of_in_their_cells_alone() {
         let spec = swept(&["solver=gauss-seidel,direct", "adaptive=0.01"], Spec::default());
-        let cells = Study::new(spec).unwrap().into_cells();
+        let cells = Study::new(spec).unwrap().cells;
         let warned: Vec<bool> = cells.iter().map(|cell| cell.warnings() == [LONG_SWEEPS]).collect();
         assert_eq!(warned, [true, false]);
         let fixed = Spec { solver: Solver::GaussSeidel.into(), ..Spec::default() }.validate().unwrap();
@@ -575,7 +566,7 @@ mod tests {
     fn the_members_to_run_fall_to_their_cells() {
         let only = Some(vec![0, 2, 3, 8]);
         let spec = swept(&["omega=1,2,3"], Spec { points: 48, curves: 3, only, ..Spec::default() });
-        let cells = Study::new(spec.clone()).unwrap().into_cells();
+        let cells = Study::new(spec.clone()).unwrap().cells;
         let members: Vec<Vec<u64>> = cells.iter().map(|cell| cell.members().collect()).collect();
         assert_eq!(members, [vec![0, 2], vec![3], vec![8]]);
     }

@@ -1,6 +1,6 @@
 //! The stages of a study: its members run side by side in parts, at one level after another and then as they are.
 
-use std::ops::Range;
+use std::{collections::BTreeSet, ops::Range};
 
 use super::Cell;
 use crate::{RefinementLevel, Spec, request::spec::Pace};
@@ -27,18 +27,9 @@ impl Stage {
 /// All stages of a study of these cells. Where its members are computed changes none of them.
 pub(super) fn stages(cells: &[Cell]) -> Vec<Stage> {
     let mut stages = Vec::new();
-    for level in RefinementLevel::FIRST {
-        let specs: Vec<_> = cells.iter().map(|cell| cell.at(level).ok()).collect();
-        stages.extend(stages_of(Some(level), &specs));
-    }
-    // All cells have the same ones, some fewer.
-    for level in cells.iter().map(Cell::finer).max_by_key(Vec::len).unwrap_or_default() {
-        let at = |cell: &Cell| cell.finer().contains(&level).then(|| cell.at(level).ok()).flatten();
-        stages.extend(stages_of(Some(level), &cells.iter().map(at).collect::<Vec<_>>()));
-    }
-    // After them, when it is known which one is a member's finest.
-    for level in cells.iter().map(Cell::varied).max_by_key(Vec::len).unwrap_or_default() {
-        let at = |cell: &Cell| cell.varied().contains(&level).then(|| cell.at(level).ok()).flatten();
+    // Variations come last, when it is known which level is a member's finest.
+    for level in cells.iter().flat_map(Cell::levels).collect::<BTreeSet<_>>() {
+        let at = |cell: &Cell| cell.levels().contains(&level).then(|| cell.at(level).ok()).flatten();
         stages.extend(stages_of(Some(level), &cells.iter().map(at).collect::<Vec<_>>()));
     }
     let own: Vec<_> = cells.iter().map(|cell| Some(cell.spec.clone())).collect();

@@ -3,7 +3,7 @@
 
 use crate::{
     MemberValues, Spec,
-    request::spec::{FinalTime, Omega, Pace, Pull, Tau},
+    request::spec::{FinalTime, OrAuto, Pace},
     request::validate::{MAX_OMEGA_TAU, MAX_STEPS, overshooting},
     theory::horizon::CurveScale,
     theory::rates::{own_omega, own_tau, strongest_pull},
@@ -90,7 +90,7 @@ fn not_followed(spec: &Spec, scale: &CurveScale) -> Option<String> {
     let (life, drive) = (short(life), spec.drive.as_ref()?);
     let problem = match (spec.pace(), spec.pull) {
         (Pace::Fixed(_), _) => "steps of one length do not follow them to it: use --adaptive --pull auto",
-        (Pace::Adaptive(_), Pull::Rate(0.0)) => "without --pull auto their lengths drift on the way",
+        (Pace::Adaptive(_), OrAuto::Number(0.0)) => "without --pull auto their lengths drift on the way",
         _ => return None,
     };
     Some(format!("--drive {drive}: members vanish at about {life}, and {problem}"))
@@ -127,7 +127,7 @@ fn short(value: f64) -> String {
 }
 
 fn far_omega(spec: &Spec, own: f64) -> Option<String> {
-    let Omega::Rate(omega) = spec.omega() else { return None };
+    let OrAuto::Number(omega) = spec.omega() else { return None };
     let ratio = omega / own;
     let far = omega != 0.0 && !spec.no_redistribution && !(1.0 / FAR_OMEGA..=FAR_OMEGA).contains(&ratio);
     let what = match ratio > 1.0 {
@@ -139,7 +139,7 @@ fn far_omega(spec: &Spec, own: f64) -> Option<String> {
 }
 
 fn far_tau(spec: &Spec, own: f64) -> Option<String> {
-    let Pace::Fixed(Tau::Step(tau)) = spec.pace() else { return None };
+    let Pace::Fixed(OrAuto::Number(tau)) = spec.pace() else { return None };
     let what = match tau / own {
         ratio if ratio > LONG_TAU => "is too long for the curve to be followed",
         ratio if ratio < SHORT_TAU => "needs far more steps than the curve does",
@@ -251,7 +251,7 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
     check_steps(spec, own_end, follows, [own_omega(rate), own_tau(rate)])?;
     let most = strongest_pull(rate, n);
     match spec.pull {
-        Pull::Rate(pull) if pull > most => {
+        OrAuto::Number(pull) if pull > most => {
             let problem = format!("so strong that it destroys the mesh of {n} nodes on this curve");
             Err(Error::value("pull", number(pull), &problem, &format!("use {most:.3} or less, or auto")))
         }
@@ -263,8 +263,8 @@ fn check_probe(spec: &Spec, values: &MemberValues, scale: &CurveScale, n: usize)
 fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()> {
     let Pace::Fixed(step) = spec.pace() else { return Ok(()) };
     let (tau, omega) = match (step, spec.omega()) {
-        (Tau::Step(tau), Omega::Auto) => (tau, own_omega),
-        (Tau::Auto, Omega::Rate(omega)) => (own_tau, omega),
+        (OrAuto::Number(tau), OrAuto::Auto) => (tau, own_omega),
+        (OrAuto::Auto, OrAuto::Number(omega)) => (own_tau, omega),
         // Both are numbers, which were checked, or both are in proportion.
         _ => return Ok(()),
     };
@@ -272,8 +272,8 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
         return Ok(());
     }
     let allowed = match step {
-        Tau::Step(_) => format!("use --tau {:.3e} or less, or auto", MAX_OMEGA_TAU / omega),
-        Tau::Auto => format!("use --omega {:.3e} or less, or auto", MAX_OMEGA_TAU / tau),
+        OrAuto::Number(_) => format!("use --tau {:.3e} or less, or auto", MAX_OMEGA_TAU / omega),
+        OrAuto::Auto => format!("use --omega {:.3e} or less, or auto", MAX_OMEGA_TAU / tau),
     };
     Err(Error::value("omega", spec.omega(), &overshooting(omega, tau), &allowed))
 }
@@ -282,8 +282,8 @@ fn check_redistribution(spec: &Spec, own_omega: f64, own_tau: f64) -> Result<()>
 /// before. An own end is asked for only where it matters: it is an integration. With `follows`, it is that end anyway.
 fn check_steps(spec: &Spec, own_end: impl Fn() -> f64, follows: bool, [own_omega, own_tau]: [f64; 2]) -> Result<()> {
     let steps_to = |t_end: f64| match (spec.pace(), spec.omega()) {
-        (Pace::Fixed(Tau::Auto), _) => t_end / own_tau,
-        (Pace::Adaptive(_), Omega::Auto) if !spec.no_redistribution => t_end * own_omega,
+        (Pace::Fixed(OrAuto::Auto), _) => t_end / own_tau,
+        (Pace::Adaptive(_), OrAuto::Auto) if !spec.no_redistribution => t_end * own_omega,
         _ => 0.0,
     };
     if steps_to(spec.final_time()) <= MAX_STEPS {
@@ -460,16 +460,19 @@ mod tests {
     fn a_curve_of_another_size_gets_its_own_times_unless_one_is_given() {
         let own = |text: &str| study(text).unwrap().spec().clone();
         let small = own("shape = 'circle:0.1'");
-        assert_eq!((small.tau, small.omega, small.stop_when_relaxed), (Some(Tau::Auto), Some(Omega::Auto), Some(true)));
+        assert_eq!(
+            (small.tau, small.omega, small.stop_when_relaxed),
+            (Some(OrAuto::Auto), Some(OrAuto::Auto), Some(true))
+        );
         assert!(small.final_time() < 1e-3);
         let adaptive = own("shape = 'circle:1e-6'\nadaptive = 0.001\npull = 'auto'");
         assert!(adaptive.tau.is_none() && adaptive.final_time() < 1e-20);
         for text in ["shape = 'circle:0.1'\nt-end = 2", "shape = 'circle:0.1'\ntau = 0.001", "shape = 'circle:0.5'"] {
             let given = own(text);
-            assert_eq!((given.tau, given.final_time()), (Some(Tau::Step(0.001)), 2.0), "{text}");
+            assert_eq!((given.tau, given.final_time()), (Some(OrAuto::Number(0.001)), 2.0), "{text}");
         }
         let swept = study("[sweep]\nshape = ['circle:1', 'circle:0.1']").unwrap();
-        assert_eq!(swept.spec().tau, Some(Tau::Auto));
+        assert_eq!(swept.spec().tau, Some(OrAuto::Auto));
         let note = |text: &str| study(text).unwrap().note().unwrap_or_default();
         assert!(
             swept.note().is_some_and(|note| note.ends_with(": used --tau auto --t-end auto")),

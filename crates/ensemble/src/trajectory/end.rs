@@ -19,11 +19,6 @@ use curvelax_flow::{
 const MIN_POINTS: u32 = 8;
 
 impl Trajectory<'_> {
-    /// Sets whether to store the nodes at both ends of the run.
-    pub fn keep_portrait(&mut self, keep: bool) {
-        self.portrait = keep;
-    }
-
     /// Returns whether [`Trajectory::end`] needs the last state.
     pub fn needs_last_state(&self) -> bool {
         self.portrait || self.equilibrium != Equilibrium::Circle
@@ -32,41 +27,42 @@ impl Trajectory<'_> {
     /// Slope of the line fitted to -ln excess, in 1/time, or against the logarithm of time if the excess falls as a
     /// power of it; and the fraction of the variance that the line explains.
     fn rate(&self) -> Option<(f64, f64)> {
-        let Decay { xx, xy, yy, .. } = self.report.decay;
+        let Decay { xx, xy, yy, .. } = self.at.report.decay;
         let clock = if self.launch.parameters.growth > 0.0 { 1.0 } else { self.time.unit(self.time_unit) };
         let (rate, r2) = (-xy / xx / clock, xy * xy / (xx * yy));
-        (self.counters.fit_points >= MIN_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
+        (self.at.counters.fit_points >= MIN_POINTS && rate.is_finite() && r2.is_finite()).then_some((rate, r2))
     }
 
     /// The excess at the times of [`schedule::grid`](crate::schedule::grid) that the member has reached.
     pub fn excess(&self) -> Vec<f64> {
-        let noted = &self.report.excess_at[..(self.counters.noted as usize).min(member::TIMES)];
-        let end = self.is_at_end().then_some(self.report.now.excess);
+        let noted = &self.at.report.excess_at[..(self.at.counters.noted as usize).min(member::TIMES)];
+        let end = self.is_at_end().then_some(self.at.report.now.excess);
         [self.start.excess].into_iter().chain(noted.iter().copied()).chain(end).collect()
     }
 
     /// Returns the member's results, without what theory predicts of them; `last` is its last state, if it is
     /// [needed](Trajectory::needs_last_state).
     pub fn end(mut self, last: Option<&State<f64>>) -> Ended {
-        let frames = std::mem::take(&mut self.frames);
-        let progress = &self.report.progress;
+        let frames = std::mem::take(&mut self.at.frames);
+        let progress = &self.at.report.progress;
         let inside = |step: u32, [high, low, length, fraction]: [f64; 4]| match (self.time, step) {
             (_, NEVER) => None,
             (Time::Fixed(clock), step) => Some(clock.inside(step, fraction)),
             (Time::Adaptive(_), _) => Some((high + (low + fraction * length)) * self.time_unit),
         };
         let p = progress;
-        let relaxed = inside(self.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
-        let halved = inside(self.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
+        let relaxed =
+            inside(self.at.counters.relax_step, [p.relax_high, p.relax_low, p.relax_length, p.relax_fraction]);
+        let halved = inside(self.at.counters.half_step, [p.half_high, p.half_low, p.half_length, p.half_fraction]);
         let [t_relax, t_half] = match &self.settling {
-            Some(settling) if self.is_at_end() => settling.times(self.t_end, self.report.now.energy / self.unit),
+            Some(settling) if self.is_at_end() => settling.times(self.t_end, self.at.report.now.energy / self.unit),
             Some(_) => [None; 2],
             None => {
                 let t_relax = if self.course == Course::Round { Some(0.0) } else { relaxed };
                 [t_relax, if self.start.excess <= ROUND { Some(0.0) } else { halved }]
             }
         };
-        let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.counters.status);
+        let failed = Status::ALL.into_iter().find(|status| *status as u32 == self.at.counters.status);
         // What happens to a curve at rest takes nothing from its time; one that is driven to a point is never at rest.
         let is_vanishing = self.vanishing.as_ref().is_some_and(Vanishing::is_expected);
         let status = match failed {
@@ -84,26 +80,25 @@ impl Trajectory<'_> {
             Equilibrium::Circle => None,
             Equilibrium::Wulff(energy) => Some(outcome::wulff_distance(&after(), &energy)).filter(|d| d.is_finite()),
         };
-        let end = Observables::new(&self.report.now, progress.turning, unit);
+        let end = Observables::new(&self.at.report.now, progress.turning, unit);
         let outcome = Outcome {
             member: self.member.index,
             cell: self.member.cell,
             status,
             t_end: self.now(),
-            steps: self.counters.steps.into(),
-            rejected: self.counters.rejected.into(),
-            sweeps_k: self.sweeps[0],
-            sweeps_x: self.sweeps[1],
+            steps: self.at.counters.steps.into(),
+            rejected: self.at.counters.rejected.into(),
+            sweeps_k: self.at.sweeps[0],
+            sweeps_x: self.at.sweeps[1],
             t_relax,
             t_half,
             rate,
             rate_r2,
-            rate_theory: None,
             start: self.start,
             turn: polygon::largest_turn(&self.member.nodes),
             end,
-            self_crossing: self.crossed,
-            solves: self.counters.solves.into(),
+            self_crossing: self.at.crossed,
+            solves: self.at.counters.solves.into(),
             label: std::mem::take(&mut self.member.label),
             group: std::mem::take(&mut self.member.group),
             points: self.member.nodes.len() as u64,
@@ -117,7 +112,7 @@ impl Trajectory<'_> {
             features: Features::of(&self.member, &self.start),
             excess: self.excess(),
             outcome,
-            rows: self.rows,
+            rows: self.at.rows,
             portrait,
             mollified: self.member.mollified,
             unresolved: self.course == Course::Unresolved,

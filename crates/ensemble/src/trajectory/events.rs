@@ -28,14 +28,14 @@ impl Trajectory<'_> {
     /// Whether events happened in the last step that are found only by its curves.
     pub(super) fn events_need_state(&self) -> bool {
         let passed = self.may_have_passed();
-        let wanted = |watch: &Watch| watch.is_due(&self.report.now) || (passed && watch.is_pending());
+        let wanted = |watch: &Watch| watch.is_due(&self.at.report.now) || (passed && watch.is_pending());
         matches!(self.time, Time::Adaptive(_)) && self.watches.iter().any(wanted)
     }
 
     /// Whether an observable may have reached a level inside the step after which the member paused, and left it again.
     /// In later dispatches the curves of that step may be gone.
     fn may_have_passed(&self) -> bool {
-        self.counters.passed != 0 && self.needs_aim()
+        self.at.counters.passed != 0 && self.needs_aim()
     }
 
     /// Finds the times of the events in the last step; `state` is needed if
@@ -44,7 +44,7 @@ impl Trajectory<'_> {
         let passed = state.filter(|_| self.may_have_passed()).map(|state| (state, self.looks(state)));
         for place in 0..self.watches.len() {
             let watch = self.watches[place];
-            if watch.is_due(&self.report.now) {
+            if watch.is_due(&self.at.report.now) {
                 self.watches[place].t = Some(self.time_of(&watch, state));
             } else if let Some((state, looks)) = passed.filter(|_| watch.is_pending()) {
                 // Each by its own level, so that no event depends on what else is watched.
@@ -58,15 +58,15 @@ impl Trajectory<'_> {
     /// The observables at both ends of the last adaptive step and at the two looks inside.
     fn looks(&self, state: &State<f64>) -> [Observed<f64>; 4] {
         let [early, late] = LOOKS.map(|at| self.observe_inside(at, &self.curve_at(at, state)));
-        [self.report.before, early, late, self.report.now]
+        [self.at.report.before, early, late, self.at.report.now]
     }
 
     /// When it is reached in the last step.
     fn time_of(&self, watch: &Watch, state: Option<&State<f64>>) -> f64 {
         match (self.time, state) {
             (Time::Fixed(clock), _) => {
-                let fraction = watch.on_line(&self.report.before, &self.report.now);
-                clock.inside(self.counters.steps.saturating_sub(1), fraction)
+                let fraction = watch.on_line(&self.at.report.before, &self.at.report.now);
+                clock.inside(self.at.counters.steps.saturating_sub(1), fraction)
             }
             (Time::Adaptive(_), Some(state)) => self.time_at(self.first_past(watch, state).unwrap_or(1.0)),
             (Time::Adaptive(_), None) => self.now(),
@@ -75,7 +75,7 @@ impl Trajectory<'_> {
 
     /// The time at a fraction of the last adaptive step.
     fn time_at(&self, fraction: f64) -> f64 {
-        let progress = &self.report.progress;
+        let progress = &self.at.report.progress;
         let past = (1.0 - fraction) * progress.taken;
         // The clock counts in ticks, and may end one of them late.
         ((progress.time_high + (progress.time_low - past)) * self.time_unit).clamp(0.0, self.now())
@@ -83,7 +83,7 @@ impl Trajectory<'_> {
 
     /// Where inside the last adaptive step it is first reached, as a fraction of it.
     fn first_past(&self, watch: &Watch, state: &State<f64>) -> Option<f64> {
-        let ends = [&self.report.before, &self.report.now].map(|at| watch.distance(at));
+        let ends = [&self.at.report.before, &self.at.report.now].map(|at| watch.distance(at));
         first_past(ends, |at| watch.distance(&self.observe_inside(at, &self.curve_at(at, state))))
     }
 }

@@ -21,7 +21,7 @@ use vanishing::Vanishing;
 use watch::{Watch, aim_at_levels};
 
 use crate::{
-    Member, Observables, Paused, Rows, Status,
+    Member, Observables, Paused, Status,
     schedule::{Clock, Outputs, Ticks},
 };
 use curvelax_base::error::{Error, Result};
@@ -104,22 +104,16 @@ pub struct Trajectory<'a> {
     t_end: f64,
     time: Time,
     launch: Run<f64>,
-    /// Output times, and how many of them the member has passed.
+    /// Output times.
     outputs: &'a Outputs,
-    served: usize,
-    counters: Counters,
-    report: Report<f64>,
     start: Observables,
-    rows: Rows,
-    /// Times and the drawn nodes, in the user's frame.
-    frames: Vec<(f64, Vec<DVec2>)>,
-    sweeps: [u64; 2],
+    /// How far it is, except what is elsewhere here: its state, its events, and what comes next.
+    at: Paused,
     course: Course,
-    /// When the polygon was first seen to cross itself.
-    crossed: Option<f64>,
     /// The events of its spec, in their order.
     watches: Vec<Watch>,
-    portrait: bool,
+    /// Whether to store the nodes at both ends of the run.
+    pub(crate) portrait: bool,
     /// What its flow relaxes curves to.
     equilibrium: Equilibrium,
     /// Whether it may shrink to a point, driven by a force.
@@ -150,15 +144,11 @@ impl Trajectory<'_> {
             counters,
             report,
             state: state.to_numbers(),
-            sweeps: self.sweeps,
-            served: self.served as u64,
-            rows: self.rows.clone(),
-            frames: self.frames.clone(),
-            crossed: self.crossed,
             events: self.watches.iter().map(|watch| watch.t).collect(),
             look_at: self.launch.parameters.look_at,
             until: self.vanishing.as_ref().map_or(0.0, |own| own.until),
             energies: self.settling.as_ref().map_or(Vec::new(), |own| own.energies.clone()),
+            ..self.at.clone()
         }
     }
 
@@ -167,37 +157,30 @@ impl Trajectory<'_> {
     /// # Errors
     /// [`Error::Request`] if a different member was paused.
     pub fn resume_from(&mut self, paused: Paused) -> Result<()> {
-        let Paused { counters, report, state, sweeps, served, rows, frames, crossed, events, look_at, until, energies } =
-            paused;
         let (index, numbers) = (self.member.index, STATE_FIELDS * self.member.nodes.len());
-        let served = usize::try_from(served).unwrap_or(usize::MAX);
-        let others = events.len() != self.watches.len();
-        if state.len() != numbers || served > self.outputs.len() || counters.status != 0 || others {
+        let Paused { counters, report, look_at, until, .. } = paused;
+        let [state, events] = [paused.state.len(), paused.events.len()];
+        let (outputs, watches) = (self.outputs.len(), self.watches.len());
+        if state != numbers || paused.served > outputs as u64 || counters.status != 0 || events != watches {
             return Err(Error::Request(format!(
-                "member {index} in the state is not that of the spec: {} numbers of {numbers}, {served} output times of \
-                 {}, {} events of {}, status {}",
-                state.len(),
-                self.outputs.len(),
-                events.len(),
-                self.watches.len(),
-                counters.status
+                "member {index} in the state is not that of the spec: {state} numbers of {numbers}, {} output times of \
+                 {outputs}, {events} events of {watches}, status {}",
+                paused.served, counters.status
             )));
         }
-        self.watches.iter_mut().zip(events).for_each(|(watch, t)| watch.t = t);
-        self.launch.state = State::from_numbers(&state);
+        self.watches.iter_mut().zip(&paused.events).for_each(|(watch, t)| watch.t = *t);
+        self.launch.state = State::from_numbers(&paused.state);
         (self.launch.counters, self.launch.report, self.launch.parameters.look_at) = (counters, report, look_at);
-        (self.rows, self.frames) = (rows, frames);
-        (self.served, self.crossed) = (served, crossed);
         if let Some(own) = &mut self.settling {
-            own.energies = energies;
+            own.energies.clone_from(&paused.energies);
         }
-        self.sweeps = sweeps;
+        self.at = Paused { report: self.at.report, state: Vec::new(), ..paused };
         self.take(counters, &report);
         if let Some(own) = &mut self.vanishing {
             own.until = until;
         }
         // One that is so small continues because it does not vanish in time, or was not at rest.
-        let (now, report) = (Observables::new(&self.report.now, 1.0, self.unit), &self.report.now);
+        let (now, report) = (Observables::new(&self.at.report.now, 1.0, self.unit), &self.at.report.now);
         let in_time = |own: &Vanishing| self.vanishes_at(own, &now).is_some();
         let gone = self.vanishing.as_ref().is_some_and(|own| own.is_due(report) && !in_time(own));
         self.vanishing.take_if(|own| gone || !own.lower(report));
@@ -206,13 +189,13 @@ impl Trajectory<'_> {
 
     /// Processes a report of the back end.
     pub fn observe(&mut self, counters: Counters, report: &Report<f64>) {
-        self.sweeps[0] += u64::from(counters.sweeps_k);
-        self.sweeps[1] += u64::from(counters.sweeps_x);
+        self.at.sweeps[0] += u64::from(counters.sweeps_k);
+        self.at.sweeps[1] += u64::from(counters.sweeps_x);
         self.take(counters, report);
-        let creeps = self.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps();
-        let failed = Status::ALL.iter().any(|status| status.is_failure() && *status as u32 == self.counters.status);
+        let creeps = self.at.counters.status == 0 && !self.is_at_end() && counters.steps >= self.most_steps();
+        let failed = Status::ALL.iter().any(|status| status.is_failure() && *status as u32 == self.at.counters.status);
         if creeps || (failed && self.is_timed_too_coarsely()) {
-            self.counters.status = Status::Stalled as u32;
+            self.at.counters.status = Status::Stalled as u32;
         }
         self.look_whether_it_vanishes();
     }
@@ -226,16 +209,16 @@ impl Trajectory<'_> {
 
     /// Ends the member if it is at the length at which that is decided, and vanishes before its final time.
     fn look_whether_it_vanishes(&mut self) {
-        let now = Observables::new(&self.report.now, 1.0, self.unit);
-        let at = &self.report.now;
-        let due = |own: &mut Vanishing| self.counters.status == 0 && own.is_due(at) && !own.is_put_off(at);
+        let now = Observables::new(&self.at.report.now, 1.0, self.unit);
+        let at = &self.at.report.now;
+        let due = |own: &mut Vanishing| self.at.counters.status == 0 && own.is_due(at) && !own.is_put_off(at);
         if let Some(own) = self.vanishing.take_if(due) {
             self.t_vanish = self.vanishes_at(&own, &now);
             if self.t_vanish.is_some() {
-                self.counters.status = Status::Vanished as u32;
+                self.at.counters.status = Status::Vanished as u32;
             }
         }
-        let time = self.report.progress.time_high + self.report.progress.time_low;
+        let time = self.at.report.progress.time_high + self.at.report.progress.time_low;
         if let Some(own) = self.vanishing.as_mut().filter(|own| own.until <= time) {
             own.look_ahead(time, &now, self.unit);
         }
@@ -249,10 +232,10 @@ impl Trajectory<'_> {
     }
 
     fn take(&mut self, counters: Counters, report: &Report<f64>) {
-        self.counters = counters;
+        self.at.counters = counters;
         // Until the first step is accepted, the host knows the start better, in f64.
         if counters.steps > 0 {
-            self.report = *report;
+            self.at.report = *report;
         }
     }
 
@@ -270,23 +253,23 @@ impl Trajectory<'_> {
 
     /// Returns whether the member has ended.
     pub fn is_over(&self) -> bool {
-        self.counters.status != 0 || self.is_at_end()
+        self.at.counters.status != 0 || self.is_at_end()
     }
 
     fn is_at_end(&self) -> bool {
-        let (progress, p) = (&self.report.progress, &self.launch.parameters);
+        let (progress, p) = (&self.at.report.progress, &self.launch.parameters);
         match self.time {
-            Time::Fixed(clock) => self.counters.steps >= clock.steps,
+            Time::Fixed(clock) => self.at.counters.steps >= clock.steps,
             Time::Adaptive(_) => (progress.time_high, progress.time_low) == (p.end_high, p.end_low),
         }
     }
 
     /// Returns the time of the last accepted state.
     pub fn now(&self) -> f64 {
-        let progress = &self.report.progress;
+        let progress = &self.at.report.progress;
         match self.time {
             _ if self.is_at_end() => self.t_end,
-            Time::Fixed(clock) => clock.time(self.counters.steps),
+            Time::Fixed(clock) => clock.time(self.at.counters.steps),
             Time::Adaptive(_) => (progress.time_high + progress.time_low) * self.time_unit,
         }
     }
@@ -312,17 +295,17 @@ impl Trajectory<'_> {
     }
 
     fn needs_aim(&self) -> bool {
-        self.counters.steps >= self.counters.goal
+        self.at.counters.steps >= self.at.counters.goal
     }
 
     fn aim(&self) -> (u32, Parameters<f64>) {
-        let steps = self.counters.steps;
+        let steps = self.at.counters.steps;
         let mut parameters = self.launch.parameters;
         aim_at_levels(&mut parameters, &self.watches);
         if let Some(vanishing) = &self.vanishing {
             vanishing.aim(&mut parameters);
         }
-        let output = self.outputs.get(self.served).map(|output| output.t);
+        let output = self.outputs.get(self.at.served as usize).map(|output| output.t);
         let goal = match self.time {
             Time::Fixed(clock) => {
                 let goal = output.map_or(clock.steps, |t| clock.locate(t).0);

@@ -23,7 +23,7 @@ impl Trajectory<'_> {
     /// Returns whether [`Trajectory::serve`] needs the state: for a snapshot, for what lies inside an adaptive step,
     /// also an event, or to check for crossings.
     pub fn wants_state(&self) -> bool {
-        let mut due = self.outputs.from(self.served).take_while(|output| self.place(output.t).is_some());
+        let mut due = self.outputs.from(self.at.served as usize).take_while(|output| self.place(output.t).is_some());
         self.is_look_due() || self.events_need_state() || due.any(|output| self.needs_curve(&output))
     }
 
@@ -40,21 +40,21 @@ impl Trajectory<'_> {
             self.look(state);
         }
         self.locate_events(state);
-        while let Some(output) = self.outputs.get(self.served)
+        while let Some(output) = self.outputs.get(self.at.served as usize)
             && let Some(fraction) = self.place(output.t)
         {
-            if self.rows.bytes() >= most {
+            if self.at.rows.bytes() >= most {
                 return false;
             }
             self.emit(&output, fraction, state);
-            self.served += 1;
+            self.at.served += 1;
         }
         true
     }
 
     /// Returns the rows so far.
     pub fn rows(&mut self) -> &mut Rows {
-        &mut self.rows
+        &mut self.at.rows
     }
 
     /// Where in the last step the time `t` is, in (0, 1]; `None` if the step has not reached it.
@@ -62,10 +62,10 @@ impl Trajectory<'_> {
         match self.time {
             Time::Fixed(clock) => {
                 let (step, fraction) = clock.locate(t);
-                (step <= self.counters.steps).then_some(fraction)
+                (step <= self.at.counters.steps).then_some(fraction)
             }
             Time::Adaptive(ticks) => {
-                let progress = &self.report.progress;
+                let progress = &self.at.report.progress;
                 let (high, low) = ticks.split(t / self.time_unit);
                 let past = (progress.time_high - high) + (progress.time_low - low);
                 let step = progress.taken.max(f64::MIN_POSITIVE);
@@ -82,9 +82,9 @@ impl Trajectory<'_> {
                 (Some(curve), Time::Adaptive(_)) => self.observe_inside(fraction, curve),
                 _ => self.report_at(fraction),
             };
-            let at = Observables::new(&at, self.report.progress.turning, unit);
+            let at = Observables::new(&at, self.at.report.progress.turning, unit);
             if output.series {
-                self.rows.series.push(SeriesRow { member, t, at });
+                self.at.rows.series.push(SeriesRow { member, t, at });
             }
             if let (true, Some(settling)) = (output.energy, &mut self.settling) {
                 settling.energies.push([t, at.energy]);
@@ -105,10 +105,10 @@ impl Trajectory<'_> {
             };
             if output.frame {
                 let nodes = snapshot.x.iter().zip(&snapshot.y).map(|(x, y)| DVec2::new(*x, *y));
-                self.frames.push((t, nodes.step_by(Portrait::stride(snapshot.x.len())).collect()));
+                self.at.frames.push((t, nodes.step_by(Portrait::stride(snapshot.x.len())).collect()));
             }
             if output.snapshot {
-                self.rows.snapshots.push(snapshot);
+                self.at.rows.snapshots.push(snapshot);
             }
         }
     }
@@ -127,14 +127,14 @@ impl Trajectory<'_> {
                 }
                 curve
             }
-            Time::Adaptive(_) => dense::inside(state, &self.report.progress, fraction),
+            Time::Adaptive(_) => dense::inside(state, &self.at.report.progress, fraction),
         }
     }
 
     /// Observes a curve inside the last step.
     pub(super) fn observe_inside(&self, fraction: f64, curve: &Curve<f64>) -> Observed<f64> {
         if fraction == 1.0 {
-            return self.report.now;
+            return self.at.report.now;
         }
         let blocks = Blocks::new(curve.len()).expect("a ring of 6 nodes or more");
         observe::observe(curve, &self.launch.parameters, blocks)
@@ -142,16 +142,16 @@ impl Trajectory<'_> {
 
     /// The observables inside the last fixed step, on a straight line.
     fn report_at(&self, fraction: f64) -> Observed<f64> {
-        let Report { before, now, .. } = &self.report;
+        let Report { before, now, .. } = &self.at.report;
         let ends = before.to_numbers().into_iter().zip(now.to_numbers());
         let numbers: Vec<f64> = ends.map(|(start, end)| between(start, end, fraction)).collect();
         Observed::from_numbers(&numbers)
     }
 
     fn is_look_due(&self) -> bool {
-        self.crossed.is_none()
-            && self.report.progress.travel >= self.launch.parameters.look_at
-            && self.report.now.k_min <= 0.0
+        self.at.crossed.is_none()
+            && self.at.report.progress.travel >= self.launch.parameters.look_at
+            && self.at.report.now.k_min <= 0.0
     }
 
     /// Checks whether the polygon crosses itself, and sets how far its nodes may move before the next check.
@@ -160,7 +160,7 @@ impl Trajectory<'_> {
     /// curvature changes sign. An adaptive step is long: it is gone through from where a crossing is possible, as far
     /// at a time as none is.
     pub(super) fn look(&mut self, state: &State<f64>) {
-        let Progress { turning, travel, taken, .. } = self.report.progress;
+        let Progress { turning, travel, taken, .. } = self.at.report.progress;
         let moved = farthest(&state.before, &state.curve);
         let adaptive = matches!(self.time, Time::Adaptive(_)) && taken > 0.0 && moved > 0.0;
         let mut at =
@@ -173,11 +173,11 @@ impl Trajectory<'_> {
             if turning.abs() != 1.0 || (changes_sign && crossing(&nodes).is_some()) {
                 let first =
                     if adaptive && turning.abs() == 1.0 { self.first_crossing([simple_at, at], state) } else { at };
-                self.crossed = Some(self.now() - (1.0 - first) * taken * self.time_unit);
+                self.at.crossed = Some(self.now() - (1.0 - first) * taken * self.time_unit);
                 self.launch.parameters.look_at = curvelax_flow::number::BIG;
                 return;
             }
-            let length = self.report.now.length;
+            let length = self.at.report.now.length;
             let far = if changes_sign { 0.5 * clearance(&nodes, length) } else { 0.0 };
             let far = far.max(length / (LOOKS_PER_SPACING * nodes.len() as f64));
             if at >= 1.0 {

@@ -9,8 +9,8 @@ use super::{
     watch::{ROUND, Watch, resolution},
 };
 use crate::{
-    Member, Observables, Rows, Spec, Status,
-    request::spec::{Omega, Pace, Precision, Pull, Sor, Tau},
+    Member, Observables, Paused, Spec, Status,
+    request::spec::{OrAuto, Pace, Precision},
     schedule::{self, Clock, Outputs, Ticks},
     theory::rates::{own_omega, own_tau, radius, relaxation_rate, strongest_pull},
 };
@@ -91,16 +91,10 @@ impl<'a> Trajectory<'a> {
             t_end: spec.final_time(),
             time,
             outputs,
-            served: 0,
-            counters: launch.counters,
-            report: launch.report,
+            at: Paused { counters: launch.counters, report: launch.report, ..Paused::default() },
             launch,
             start,
-            rows: Rows::default(),
-            frames: Vec::new(),
-            sweeps: [0; 2],
             course,
-            crossed: None,
             watches,
             portrait: false,
             equilibrium: flow.equilibrium(),
@@ -109,7 +103,7 @@ impl<'a> Trajectory<'a> {
             settling: Settling::of(spec, &start),
             conserved: forcing.conserved.is_some(),
         };
-        trajectory.counters.status = status.map_or(0, |status| status as u32);
+        trajectory.at.counters.status = status.map_or(0, |status| status as u32);
         let state = std::mem::replace(&mut trajectory.launch.state, State::zeros(0));
         trajectory.look(&state);
         // At the start one row and one snapshot are due.
@@ -150,8 +144,8 @@ fn begin_time(launch: &mut Run<f64>, spec: &Spec, time_unit: f64, precision: Pre
     let tolerance = match spec.pace() {
         Pace::Fixed(tau) => {
             let tau = match tau {
-                Tau::Step(tau) => tau,
-                Tau::Auto => launch.parameters.tau * time_unit,
+                OrAuto::Number(tau) => tau,
+                OrAuto::Auto => launch.parameters.tau * time_unit,
             };
             return (Time::Fixed(Clock::new(tau, spec.final_time())), None);
         }
@@ -218,24 +212,24 @@ fn parameters(
     Parameters {
         law,
         tau: match spec.pace() {
-            Pace::Fixed(Tau::Step(tau)) => tau / time,
-            Pace::Fixed(Tau::Auto) => own_tau(rate),
+            Pace::Fixed(OrAuto::Number(tau)) => tau / time,
+            Pace::Fixed(OrAuto::Auto) => own_tau(rate),
             Pace::Adaptive(_) => 0.0,
         },
         omega: match spec.omega() {
-            Omega::Rate(rate) => rate * time,
-            Omega::Auto => own_omega(rate),
+            OrAuto::Number(rate) => rate * time,
+            OrAuto::Auto => own_omega(rate),
         },
         redistribution: f64::from(u8::from(!spec.no_redistribution)),
         pull: match spec.pull {
-            Pull::Rate(rate) => rate * time,
-            Pull::Auto => (PULL_PER_RATE * rate).min(strongest_pull(rate, nodes.len())),
+            OrAuto::Number(rate) => rate * time,
+            OrAuto::Auto => (PULL_PER_RATE * rate).min(strongest_pull(rate, nodes.len())),
         },
         geometric: f64::from(u8::from(spec.is_geometric())),
         tolerance,
         sor: match spec.sor() {
-            Sor::Factor(factor) => factor,
-            Sor::Auto => 0.0,
+            OrAuto::Number(factor) => factor,
+            OrAuto::Auto => 0.0,
         },
         polygon_ratio: flow.equilibrium().least_quotient(nodes.len()),
         ..Parameters::of_flow(flow, 1.0)

@@ -50,21 +50,20 @@ impl Watch {
         precision: Precision,
         resolution: f64,
     ) -> Vec<Watch> {
-        events.iter().map(|event| Watch::new(&event.condition, start, unit, precision, resolution)).collect()
-    }
-
-    fn new(condition: &Condition, start: &Observed<f64>, unit: f64, precision: Precision, resolution: f64) -> Watch {
-        let Condition { observable, falls, .. } = *condition;
-        let level = precision.rounded(condition.level_in(unit, start));
-        let is_excess = observable == Observable::Excess;
-        // As for t_half: the excess of a regular polygon is rounding.
-        let is_round = is_excess && falls && start.excess <= ROUND;
-        let watch = Watch { observable, falls, level: if level.abs() <= BIG { level } else { f64::NAN }, t: None };
-        if is_round || watch.is_reached_by(start) {
-            return Watch { t: Some(0.0), ..watch };
-        }
-        let is_lost = is_excess && level < resolution;
-        Watch { level: if is_lost { f64::NAN } else { watch.level }, ..watch }
+        let watch = |Event { condition, .. }: &Event| {
+            let Condition { observable, falls, .. } = *condition;
+            let level = precision.rounded(condition.level_in(unit, start));
+            let is_excess = observable == Observable::Excess;
+            // As for t_half: the excess of a regular polygon is rounding.
+            let is_round = is_excess && falls && start.excess <= ROUND;
+            let watch = Watch { observable, falls, level: if level.abs() <= BIG { level } else { f64::NAN }, t: None };
+            if is_round || watch.is_reached_by(start) {
+                return Watch { t: Some(0.0), ..watch };
+            }
+            let is_lost = is_excess && level < resolution;
+            Watch { level: if is_lost { f64::NAN } else { watch.level }, ..watch }
+        };
+        events.iter().map(watch).collect()
     }
 
     pub(super) fn is_pending(&self) -> bool {

@@ -90,7 +90,7 @@ impl Origin {
     /// [`Error::Request`] for outlines in a current folder without a name.
     pub fn new(study: &Study, platform: Platform) -> Result<Origin> {
         let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        let outlines: Vec<(PathBuf, u32)> = files(&study.outlines()).into_iter().collect();
+        let outlines: Vec<(PathBuf, u32)> = files(study.outlines()).into_iter().collect();
         let base = if outlines.is_empty() { String::new() } else { here()? };
         Ok(Origin { spec: study.spec().to_toml()?, platform, moves: Vec::new(), base, outlines, started })
     }
@@ -100,7 +100,7 @@ impl Origin {
     /// # Errors
     /// [`Error::Request`] naming the first that differs.
     pub fn check_outlines(&self, study: &Study) -> Result<()> {
-        self.differs(&study.outlines()).map_or(Ok(()), |path| Err(self.changed(path)))
+        self.differs(study.outlines()).map_or(Ok(()), |path| Err(self.changed(path)))
     }
 
     /// The first file of the beginning that is not among these, as it was.

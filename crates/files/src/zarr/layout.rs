@@ -87,7 +87,7 @@ pub fn attributes(spec: &Spec, points: usize) -> Result<Vec<(&'static str, Value
 
 /// The times of the snapshots. Times equal to the final one up to rounding are replaced by it, as in `snapshots.csv`.
 pub fn times(spec: &Spec) -> Vec<f64> {
-    Outputs::new(spec.final_time(), None, &spec.snapshots, &[]).from(0).map(|output| output.t).collect()
+    Outputs::new(spec.final_time(), None, [&spec.snapshots, &[], &[]]).from(0).map(|output| output.t).collect()
 }
 
 /// The index of the time nearest to `t`. They differ only by rounding, if final times vary from cell to cell.

@@ -15,8 +15,8 @@ use curvelax_backend::Backend;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Ended, Extent, Outcome, SeriesRow, Sink, Snapshot,
-    outcome::rows,
-    request::spec::{Pace, Precision, Tau},
+    outcome::progress::bytes_of,
+    request::spec::{OrAuto, Pace, Precision},
     schedule::Clock,
     simulate::simulate,
 };
@@ -150,7 +150,7 @@ impl Sink for PilotSink<'_> {
     fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
         self.seen.series += series.len();
         self.seen.snapshots += snapshots.len();
-        let length = rows::bytes_of(series.len(), snapshots.len(), snapshots.first().map_or(0, |first| first.x.len()));
+        let length = bytes_of(series.len(), snapshots.len(), snapshots.first().map_or(0, |first| first.x.len()));
         Ok(Some(Extent { length: length as u64, ..Extent::default() }))
     }
 
@@ -342,7 +342,7 @@ pub fn sample(
         series: per_member(|seen| seen.series as f64).unwrap_or(most_series) * all as f64,
         nodes: per_member(|seen| seen.snapshots as f64).unwrap_or(most_snapshots) * all as f64 * points(cohort) as f64,
     };
-    let most = rows::bytes_of(most_series as usize, most_snapshots as usize, points(cohort));
+    let most = bytes_of(most_series as usize, most_snapshots as usize, points(cohort));
     let rows = per_member(|seen| seen.rows).unwrap_or(most as f64);
     let share = pilots.last().map_or(1.0, |seen| seen.share.clamp(0.0, 1.0));
     let reads_back = cohort.iter().any(|cell| !cell.spec.snapshots.is_empty()) && share > 0.0;
@@ -410,7 +410,7 @@ fn extrapolated(pilots: &[PilotResult], all: u64, cost: impl Fn(&PilotResult) ->
 /// Steps of a member, if these do not depend on its curve.
 fn certain_steps(cohort: &[Cell]) -> Option<f64> {
     let of_cell = |Cell { spec, .. }: &Cell| match spec.pace() {
-        Pace::Fixed(Tau::Step(tau)) if !spec.stops_when_relaxed() => {
+        Pace::Fixed(OrAuto::Number(tau)) if !spec.stops_when_relaxed() => {
             Some(f64::from(Clock::new(tau, spec.final_time()).steps))
         }
         _ => None,

@@ -105,7 +105,7 @@ impl RunReport {
         let growing = Growing::begin(&folder, study.spec(), study.points())?;
         let mut report = RunReport::new(folder, growing, study, origin, options);
         let first = RunProgress { resident: Some(BTreeMap::new()), ..RunProgress::default() };
-        match outlines::save(&report.folder, &study.outlines()).and_then(|()| report.checkpoint(&first)) {
+        match outlines::save(&report.folder, study.outlines()).and_then(|()| report.checkpoint(&first)) {
             Ok(()) => Ok(report),
             Err(error) => {
                 let error = report.explain(error);

@@ -7,7 +7,7 @@ use curvelax_base::{
 use curvelax_curve::Perturbation;
 use curvelax_ensemble::{
     Drawn, Event, Spec,
-    request::spec::{FinalTime, Pace, Tau, Units},
+    request::spec::{FinalTime, OrAuto, Pace, Units},
 };
 use curvelax_statistics::{GoodnessOfFit, LogRank, PowerLaw};
 use curvelax_study::{
@@ -40,8 +40,8 @@ fn degrees(count: usize) -> String {
 pub fn describe(spec: &Spec) -> String {
     let time = time_unit(spec);
     let pace = match spec.pace() {
-        Pace::Fixed(Tau::Step(tau)) => ("tau", format!("tau = {tau:?}{time}")),
-        Pace::Fixed(Tau::Auto) => ("tau", "tau = auto".into()),
+        Pace::Fixed(OrAuto::Number(tau)) => ("tau", format!("tau = {tau:?}{time}")),
+        Pace::Fixed(OrAuto::Auto) => ("tau", "tau = auto".into()),
         Pace::Adaptive(tolerance) => ("adaptive", format!("adaptive {tolerance:?}")),
     };
     let drawn = |key: &str, value: &Drawn<f64>| if value.is_drawn() { format!("{key} {value}") } else { String::new() };

@@ -51,7 +51,7 @@ impl PlacedStudy {
         let (backend, platform) = open(cells, choice, host)?;
         if choice.device().kind() != platform.backend {
             host.say(&format!("note: on the CPU instead: {}", platform.reason));
-            let on_cpu = PlacedStudy::of(self.plan.on_cpu(self.study.outlines()))?;
+            let on_cpu = PlacedStudy::of(self.plan.on_cpu(self.study.outlines().clone()))?;
             return Ok((on_cpu.because(&platform.reason), FirstBackend::Announced));
         }
         let first = match platform.backend {

@@ -4,7 +4,7 @@ use curvelax_ensemble::{
     Spec,
     request::{
         drawn::Drawn,
-        spec::{Pace, Precision, Pull},
+        spec::{OrAuto, Pace, Precision},
     },
 };
 use curvelax_flow::forcing::Drive;
@@ -27,7 +27,7 @@ impl Remedies {
         Remedies {
             geometric: spec.is_geometric(),
             adaptive: matches!(spec.pace(), Pace::Adaptive(_)),
-            pulled: spec.pull != Pull::Rate(0.0),
+            pulled: spec.pull != OrAuto::Number(0.0),
             driven: spec.sweep.has("drive") || spec.drive.as_ref().is_some_and(is_inwards),
             vesicles: spec.has_vesicles(),
             stops: spec.stops_when_relaxed(),

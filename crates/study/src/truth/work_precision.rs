@@ -9,7 +9,7 @@ use crate::placement;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{
     Cell, Ended, Family, Outcome, Spec,
-    request::spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, Omega, Precision, Pull, Solver},
+    request::spec::{BackendChoice, DEFAULT_ADAPTIVE, FinalTime, OrAuto, Precision, Solver},
     simulate::simulate,
 };
 use curvelax_flow::scheme::extrapolation::{LEAST_ORDER, MOST_ORDER};
@@ -197,8 +197,8 @@ impl WorkPrecision {
         let spec = Spec {
             curves: Effort::of(solver).members,
             solver: solver.into(),
-            omega: Some(Omega::Auto),
-            pull: Pull::Auto,
+            omega: Some(OrAuto::Auto),
+            pull: OrAuto::Auto,
             t_end: Some(FinalTime::Auto),
             tau: None,
             adaptive: None,

@@ -1,7 +1,7 @@
 //! Checks of times and steps.
 
 use super::{MAX_STEPS, TIMES, positive, tightest_adaptive};
-use crate::request::spec::{DEFAULT_ADAPTIVE, FinalTime, Pace, Precision, Spec, Tau, final_times};
+use crate::request::spec::{DEFAULT_ADAPTIVE, FinalTime, OrAuto, Pace, Precision, Spec, final_times};
 use curvelax_base::{
     error::{Error, Result},
     text::number,
@@ -39,7 +39,7 @@ impl Spec {
     }
 
     fn check_final_times(&self) -> Result<()> {
-        let swept = self.sweep.axes().iter().find(|axis| axis.key == "t-end");
+        let swept = self.sweep.axis("t-end");
         let times = match &self.t_end {
             Some(FinalTime::OfCells(times)) if times.len() as u64 != self.sweep.cells() || swept.is_some() => {
                 return Err(final_times(times.len(), self.sweep.cells()));
@@ -63,8 +63,8 @@ impl Spec {
         }
     }
 
-    fn check_fixed(&self, tau: Tau) -> Result<()> {
-        let Tau::Step(tau) = tau else { return Ok(()) };
+    fn check_fixed(&self, tau: OrAuto) -> Result<()> {
+        let OrAuto::Number(tau) = tau else { return Ok(()) };
         positive("tau", tau, "a time step", "0.001")?;
         let Some(end) = self.known_end() else { return Ok(()) };
         let t_end = number(end);
