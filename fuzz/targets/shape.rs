@@ -43,7 +43,7 @@ fn words(bytes: &[u8]) {
     if let Ok(modes) = text.parse::<Modes>() {
         assert_eq!(modes.to_string().parse(), Ok(modes));
     }
-    let _ = (text.parse::<Sampling>(), text.parse::<Pull>(), text.parse::<Sor>());
+    let _ = (text.parse::<Pull>(), text.parse::<Sor>());
     if let Ok(axis) = text.parse::<SweepAxis>() {
         assert_eq!(axis.labels().len(), axis.values.len());
     }

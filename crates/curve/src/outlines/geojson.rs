@@ -12,8 +12,8 @@ use glam::DVec2;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Value, value::RawValue};
 
-use super::piece::{NoOutline, Piece, Properties, closed, label, outer_ring, outer_rings, property};
-use crate::outline::{Places, RingPoints, Source};
+use super::piece::{NoOutline, Piece, Properties, closed, label, of_polygons, outer_ring, outer_rings, property};
+use crate::outline::Source;
 use curvelax_base::error::{Error, Result, one_line, plainly, shortened};
 
 /// Maximum characters of foreign text in a message.
@@ -144,15 +144,8 @@ fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> 
         }
     };
     let properties: Properties = feature.properties.iter().flatten().filter_map(written).collect();
-    let several = rings.len() > 1;
-    let piece = |(index, points): (usize, Vec<DVec2>)| {
-        let separator = if part.is_empty() { "" } else { ", " };
-        let part = if several { format!("{part}{separator}polygon {}", index + 1) } else { part.clone() };
-        let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
-        let polygon = several.then_some(index + 1);
-        Ok(Piece { name: name.clone(), polygon, properties: properties.clone(), ..Piece::new(item, ring) })
-    };
-    rings.into_iter().enumerate().map(piece).collect()
+    let named = |piece| Piece { name: name.clone(), properties: properties.clone(), ..piece };
+    of_polygons(item, &part, rings).map(|piece| Ok(named(piece))).collect()
 }
 
 /// The name of a feature: its `id`, or a property that is usually one.

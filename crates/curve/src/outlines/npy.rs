@@ -10,7 +10,7 @@ use npyz::{DType, NpyFile, Order, TypeChar};
 use zip::ZipArchive;
 
 use super::piece::{Piece, label};
-use crate::outline::{Places, RingPoints, Source};
+use crate::outline::{Places, RingPoints, Source, within};
 use curvelax_base::{
     error::{Error, Result, one_line, shortened},
     input::MAX_OUTLINE,
@@ -110,8 +110,7 @@ fn of_array(source: Source, place: &str, bytes: &[u8]) -> Result<Vec<Piece>> {
     }
     let several = spans.len() > 1;
     for (index, (block, span)) in spans.into_iter().enumerate() {
-        let separator = if place.is_empty() { "" } else { ", " };
-        let part = if several { format!("{place}{separator}outline {}", index + 1) } else { place.to_owned() };
+        let part = if several { within(place, &format!("outline {}", index + 1)) } else { place.to_owned() };
         let numbers = span.clone().collect();
         let places = Places { part, unit: "row", numbers };
         let ring = RingPoints::new(span.map(|row| coordinates.point(block, row)).collect(), places);

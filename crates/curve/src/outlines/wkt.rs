@@ -9,8 +9,8 @@ use wkt::{
     types::{Coord, LineString, Polygon},
 };
 
-use super::piece::{NoOutline, Piece, closed, outer_ring, outer_rings};
-use crate::outline::{Places, RingPoints, Source};
+use super::piece::{NoOutline, Piece, closed, of_polygons, outer_ring, outer_rings};
+use crate::outline::Source;
 use curvelax_base::{
     error::{Result, shortened},
     text,
@@ -53,13 +53,7 @@ fn read(source: Source, item: usize, line: usize, content: &str) -> Vec<Result<P
             return vec![Err(source.refusal(&place, &problem, remedy))];
         }
     };
-    let several = rings.len() > 1;
-    let piece = |(index, points): (usize, Vec<DVec2>)| {
-        let part = if several { format!("{place}, polygon {}", index + 1) } else { place.clone() };
-        let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
-        Ok(Piece { polygon: several.then_some(index + 1), in_degrees, ..Piece::new(item, ring) })
-    };
-    rings.into_iter().enumerate().map(piece).collect()
+    of_polygons(item, &place, rings).map(|piece| Ok(Piece { in_degrees, ..piece })).collect()
 }
 
 /// Whether the geometry is in degrees, and its text without the prefix that says so.

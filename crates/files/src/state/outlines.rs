@@ -11,11 +11,11 @@ use super::{
 };
 use crate::{folder::OutputFolder, names::OUTLINES};
 use curvelax_base::error::{Error, Result};
-use curvelax_curve::outlines::SavedOutline;
+use curvelax_curve::outlines::Labelled;
 use curvelax_ensemble::Outlines;
 
 /// The content of the file: the text of each shape, and its outlines.
-type Content<'a> = Vec<(String, Vec<SavedOutline<'a>>)>;
+type Content = Vec<(String, Vec<Labelled>)>;
 
 /// The fingerprint of its layout.
 static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Content>);
