@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     draw::{
-        charts::{WorkCurve, WorkDiagram, WorkPanels},
+        charts::{ChartText, WorkCurve, WorkDiagram, WorkPanels},
         medium::Medium,
     },
     ensemble::{
@@ -266,13 +266,9 @@ fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRo
         label: solver.name().into(),
         curves: rows.iter().filter(|way| way.iter().all(|row| row.solver == *solver)).map(curve).collect(),
     };
-    WorkDiagram {
-        title: WORK_TITLE,
-        note: &measured.sentence(),
-        costs: [("solves per member", ""), ("time per member", "ms")],
-        rows: solvers.iter().map(panels).collect(),
-    }
-    .draw(medium)
+    let text = ChartText { title: WORK_TITLE.into(), note: measured.sentence(), ..ChartText::default() };
+    let costs = [("solves per member", ""), ("time per member", "ms")];
+    WorkDiagram { text, costs, rows: solvers.iter().map(panels).collect() }.draw(medium)
 }
 
 /// An aligned table, grouped by problem; a run that ended early has its status instead of its error.
