@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 
 use crate::outline::{MAX_LABEL, Places, RingPoints, within};
-use curvelax_base::error::shortened;
+use curvelax_base::error::{Result, shortened};
 
 /// Properties of a feature, by name.
 pub type Properties = BTreeMap<String, String>;
@@ -44,6 +44,12 @@ pub(super) fn of_polygons(item: usize, part: &str, rings: Vec<Vec<DVec2>>) -> im
         let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
         Piece { polygon: several.then_some(number), ..Piece::new(item, ring) }
     })
+}
+
+/// The outlines of all parts of a file, or why a part has none.
+pub(super) fn each(parts: impl Iterator<Item = Result<Vec<Piece>>>) -> Vec<Result<Piece>> {
+    let pieces = parts.map(|part| part.map_or_else(|e| vec![Err(e)], |pieces| pieces.into_iter().map(Ok).collect()));
+    pieces.flatten().collect()
 }
 
 /// Why a geometry is no outline, and what to do.
