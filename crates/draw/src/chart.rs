@@ -105,10 +105,9 @@ impl Entry {
     /// Pixels of the sample before the label.
     fn sample(&self) -> f64 {
         match self.mark {
-            LegendMark::Marker(_) | LegendMark::Points | LegendMark::Up => 10.0,
-            LegendMark::HollowUp | LegendMark::Right | LegendMark::Stroke => 10.0,
+            LegendMark::Series | LegendMark::Dashed | LegendMark::Thin | LegendMark::Thick | LegendMark::Band => SAMPLE,
             LegendMark::More => 0.0,
-            _ => SAMPLE,
+            _ => 10.0,
         }
     }
 
@@ -183,13 +182,10 @@ impl Heading<'_> {
     /// Begins a picture with this heading and `body` pixels below it; returns where these begin.
     pub fn begin(&self, medium: Medium, body: f64) -> (Svg, f64) {
         let (full, room) = (medium.width(), medium.width() - 2.0 * MARGIN);
-        let (titles, lines) = match medium {
-            Medium::Screen | Medium::Page => {
-                let lines = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
-                (wrapped(self.title, TITLE, room), lines)
-            }
-            Medium::Paper(_) => (Vec::new(), Vec::new()),
-        };
+        // On paper a caption has both.
+        let (title, sentences) = if medium.is_screen() { (self.title, &self.sentences[..]) } else { ("", &[][..]) };
+        let titles = wrapped(title, TITLE, room);
+        let lines: Vec<String> = sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
         let rows = self.rows(room, medium);
         let above = [(titles.len(), TITLE_LINE), (lines.len(), LINE), (rows.len(), LEGEND_LINE)];
         let top = 22.0 + above.iter().map(|(count, height)| *count as f64 * height).sum::<f64>();

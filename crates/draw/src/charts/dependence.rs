@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{TIME, named_rows, only_panel};
+use super::{TIME, named_rows, only_panel, some};
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
@@ -14,10 +14,7 @@ use crate::{
     trace,
     width::{SIZE, shortened},
 };
-use curvelax_base::{
-    interval::Interval,
-    text::{count, significant},
-};
+use curvelax_base::{interval::Interval, text::significant};
 
 const HEIGHT: f64 = 300.0;
 /// Height of a named setting with one series, and the height each further series adds.
@@ -193,12 +190,8 @@ impl Dependence<'_> {
 
     /// A sentence about cells without a median.
     fn missing(&self) -> String {
-        match self.levels().filter(|level| level.median.is_none()).count() {
-            0 => String::new(),
-            missing => {
-                format!("{} without a median: fewer than half of the members relaxed.", count(missing as u64, "cell"))
-            }
-        }
+        let missing = self.levels().filter(|level| level.median.is_none()).count();
+        some(missing, "cell", "without a median: fewer than half of the members relaxed.")
     }
 
     /// The scale of an axis of these values: logarithmic if there is a power law, where all values allow it.

@@ -3,6 +3,7 @@
 use super::{
     GRID_HEIGHT, PanelGrid,
     bins::{Bins, guide},
+    some,
 };
 use crate::{
     axis::{Axis, Scale},
@@ -58,15 +59,9 @@ impl MeshMeasure {
     }
 
     fn sentence(&self) -> String {
-        let zeros = match self.zeros {
-            0 => String::new(),
-            zeros => format!("{} with {} 0 left out. ", count(zeros as u64, "member"), self.name),
-        };
-        let unknown = match self.unknown {
-            0 => String::new(),
-            unknown => format!("{} without {}.", count(unknown as u64, "member"), self.name),
-        };
-        (zeros + &unknown).trim().into()
+        let zeros = some(self.zeros, "member", &format!("with {} 0 left out.", self.name));
+        let unknown = some(self.unknown, "member", &format!("without {}.", self.name));
+        [zeros, unknown].join(" ").trim().into()
     }
 
     /// Draws the panel `i`.

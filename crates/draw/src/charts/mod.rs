@@ -30,6 +30,7 @@ pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 
 pub use super::chart::{CellKey, ChartText, Crossed, EstimatedNumber};
 
+use curvelax_base::text::count;
 use glam::DVec2;
 
 use super::{
@@ -51,6 +52,11 @@ const GRID_GAP: f64 = 14.0;
 
 /// The lower and upper bounds of a curve at each of its times.
 pub type Band = (Vec<f64>, Vec<f64>);
+
+/// `3 members REST`; nothing of none.
+fn some(number: usize, one: &str, rest: &str) -> String {
+    if number == 0 { String::new() } else { format!("{} {rest}", count(number as u64, one)) }
+}
 
 /// Whether the bands of curves are drawn, of which each may have one.
 fn shows_bands<'a>(bands: impl ExactSizeIterator<Item = &'a Option<Band>>) -> bool {

@@ -2,14 +2,14 @@
 
 use super::{
     bins::{Bins, CellValues, guide},
-    only_panel,
+    only_panel, some,
 };
 use crate::{
     axis::{Axis, Scale},
     chart::{ChartText, Colours, Entry, LegendMark},
     medium::Medium,
 };
-use curvelax_base::text::{count, significant};
+use curvelax_base::text::significant;
 
 const HEIGHT: f64 = 200.0;
 
@@ -33,10 +33,7 @@ impl FittedRates<'_> {
     pub fn draw(self, medium: Medium) -> String {
         let FittedRates { text, mut cells, relative, unit, without } = self;
         CellValues::sort(&mut cells);
-        let without = match without {
-            0 => String::new(),
-            without => format!("{} without a rate: fewer than 8 points in the window.", count(without, "member")),
-        };
+        let without = some(without as usize, "member", "without a rate: fewer than 8 points in the window.");
         if cells.iter().all(|cell| cell.numbers.is_empty()) {
             let reason = "No member was followed closely enough for a rate to be fitted.";
             return text.heading([without]).nothing(medium, reason);

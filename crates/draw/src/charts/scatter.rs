@@ -2,14 +2,14 @@
 //!
 //! The pointer on a dot shows its member and its numbers.
 
-use super::{GRID_HEIGHT, PanelGrid, TIME};
+use super::{GRID_HEIGHT, PanelGrid, TIME, some};
 use crate::{
     axis::{Axis, Scale},
     chart::{ChartText, Colours, Entry, LegendMark, Panel, triangle_up},
     medium::Medium,
     svg::{Svg, dots},
 };
-use curvelax_base::text::{count, significant};
+use curvelax_base::text::significant;
 
 /// A time against features.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -77,9 +77,7 @@ impl Scatter<'_> {
         let colours = Colours::of(self.cells, &self.text.key);
         heading.sentences.push(colours.sentence(self.cells));
         let hidden = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| !point.is_drawable()).count();
-        if hidden > 0 {
-            heading.sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
-        }
+        heading.sentences.push(some(hidden, "dot", "out of range."));
         let places = PanelGrid::new(medium, colours.room(GRID_HEIGHT));
         heading.legend = self.legend(&colours);
         let (mut svg, top) = heading.begin(medium, places.height(self.panels.len()));
