@@ -10,7 +10,7 @@ use super::{
     fingerprint::fingerprint,
 };
 use crate::{folder::OutputFolder, names::OUTLINES};
-use curvelax_base::error::{Error, Result};
+use curvelax_base::error::Result;
 use curvelax_curve::outlines::Labelled;
 use curvelax_ensemble::Outlines;
 
@@ -25,8 +25,7 @@ pub fn save(folder: &OutputFolder, outlines: &Outlines) -> Result<()> {
     if outlines.is_empty() {
         return Ok(());
     }
-    let bytes = sealed_body(*LAYOUT, &outlines.saved());
-    folder.keep_outlines(&bytes.map_err(|e| Error::Failed(format!("cannot write {OUTLINES}: {e}")))?)
+    folder.keep_outlines(&sealed_body(*LAYOUT, OUTLINES, &outlines.saved())?)
 }
 
 /// The outlines that were saved in `folder` by the run with this origin; none if it has none.
