@@ -39,7 +39,7 @@ fn words(bytes: &[u8]) {
     if let Ok(modes) = text.parse::<Modes>() {
         assert_eq!(modes.to_string().parse(), Ok(modes));
     }
-    let _ = (text.parse::<Sampling>(), text.parse::<OrAuto>());
+    let _ = text.parse::<OrAuto>();
     if let Ok(axis) = text.parse::<SweepAxis>() {
         assert_eq!(axis.labels().len(), axis.values.len());
     }

@@ -1,9 +1,6 @@
 //! `curvelax convergence`: the error of the scheme against exact solutions, and its order.
 
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use super::{
     flags, note,
@@ -13,7 +10,7 @@ use super::{
 };
 use crate::{
     draw::{
-        charts::{WorkCurve, WorkDiagram, WorkPanels},
+        charts::{ChartText, WorkCurve, WorkDiagram, WorkPanels},
         medium::Medium,
     },
     ensemble::{
@@ -26,7 +23,6 @@ use crate::{
         tables::Table,
         truth_tables::{CostRow, ErrorRow},
     },
-    paper::{Printer, missing_letters},
     placement,
     text::significant,
     truth::{ConvergenceRow, Problem, WorkPrecision, WorkRow, problems, studies},
@@ -102,7 +98,6 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         let remedy = "add --work-precision --out DIR, or leave out --format, --width and --dpi";
         return Err(Error::Request(format!("only --work-precision draws a picture, into --out: {remedy}")));
     }
-    let on_screen = args.paper.on_screen();
     let chosen = match args.problem.is_empty() {
         true => problems(),
         false => args.problem.iter().map(|name| Problem::named(name)).collect::<Result<_>>()?,
@@ -123,7 +118,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     choice.settle_place(&mut method);
     method.solver = method.solver().into();
     let names = match (args.work_precision, refereed) {
-        (true, _) => [names::WORK.into()].into_iter().chain(pictures(on_screen, &prints)).collect(),
+        (true, _) => [names::WORK.into()].into_iter().chain(prints.extensions().map(work_picture)).collect(),
         (_, true) => vec![names::REFEREE.into()],
         _ => vec![names::CONVERGENCE.into()],
     };
@@ -137,7 +132,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
     }
     if args.work_precision {
         let solvers = solver.map_or(Solver::ALL.to_vec(), |_| vec![method.solver()]);
-        return work_precision(&method, &solvers, folder, args.quiet, (on_screen, &prints));
+        return work_precision(&method, &solvers, folder, args.quiet, prints);
     }
     let mut rows = Vec::new();
     for problem in &chosen {
@@ -169,11 +164,6 @@ fn work_picture(extension: &str) -> String {
     names::WORK_PICTURE.replace("svg", extension)
 }
 
-fn pictures(on_screen: bool, prints: &Prints) -> impl Iterator<Item = String> {
-    let printed = prints.formats.iter().map(|(extension, _)| *extension);
-    on_screen.then_some("svg").into_iter().chain(printed).map(work_picture)
-}
-
 /// Checks a spec whose times follow its curves as they are made.
 fn checked(spec: Spec) -> Result<Spec> {
     let study = Study::new(spec)?;
@@ -190,7 +180,7 @@ fn work_precision(
     solvers: &[Solver],
     folder: Option<OutputFolder>,
     quiet: bool,
-    (on_screen, prints): (bool, &Prints),
+    mut prints: Prints,
 ) -> Result<()> {
     let measured = WorkPrecision::new(method)?;
     if !quiet {
@@ -210,23 +200,12 @@ fn work_precision(
     if let Some(folder) = folder {
         let costs: Vec<CostRow> = rows.iter().flatten().map(CostRow::of).collect();
         let table = Table::of(folder.file(names::WORK)?, &costs)?;
-        let mut files = vec![table];
-        if on_screen {
-            let svg = work_diagram(&measured, solvers, &rows, Medium::Screen);
-            files.push(folder.write(names::WORK_PICTURE, svg)?);
+        let draw = |medium| work_diagram(&measured, solvers, &rows, medium);
+        let pictures = prints.write(&folder, work_picture, WORK_TITLE, draw)?;
+        if !quiet {
+            prints.note_missing();
         }
-        if !prints.formats.is_empty() {
-            let svg = work_diagram(&measured, solvers, &rows, Medium::Paper(prints.width.pixels()));
-            let mut missing = BTreeSet::new();
-            for (extension, content) in prints.of(&Printer::default(), (WORK_TITLE, &svg), &mut missing)? {
-                files.push(folder.write(&work_picture(extension), content)?);
-            }
-            missing_letters(&missing)
-                .iter()
-                .filter(|_| !quiet)
-                .for_each(|missing_letters| note(&format!("note: {missing_letters}")));
-        }
-        folder.publish_all(files)?;
+        folder.publish_all([table].into_iter().chain(pictures).collect())?;
     }
     match rows.iter().flatten().filter(|row| row.error.is_none()).count() {
         0 => Ok(()),
@@ -266,13 +245,9 @@ fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRo
         label: solver.name().into(),
         curves: rows.iter().filter(|way| way.iter().all(|row| row.solver == *solver)).map(curve).collect(),
     };
-    WorkDiagram {
-        title: WORK_TITLE,
-        note: &measured.sentence(),
-        costs: [("solves per member", ""), ("time per member", "ms")],
-        rows: solvers.iter().map(panels).collect(),
-    }
-    .draw(medium)
+    let text = ChartText { title: WORK_TITLE.into(), note: measured.sentence(), ..ChartText::default() };
+    let costs = [("solves per member", ""), ("time per member", "ms")];
+    WorkDiagram { text, costs, rows: solvers.iter().map(panels).collect() }.draw(medium)
 }
 
 /// An aligned table, grouped by problem; a run that ended early has its status instead of its error.

@@ -1,16 +1,11 @@
 //! `curvelax figure`: the paper's figures and their data.
 
-use std::{collections::BTreeSet, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::builder::PossibleValuesParser;
 
-use super::{
-    note,
-    paper::{PaperFlags, Prints},
-    print,
-};
+use super::{note, paper::PaperFlags, print};
 use crate::{
-    draw::medium::Medium,
     ensemble::{Ended, Spec},
     error::Result,
     figures::{FIGURES, Figure, OMEGA, POINTS},
@@ -18,7 +13,6 @@ use crate::{
         OutputFolder, Owner,
         tables::{NodeRow, Table},
     },
-    paper::{Printer, missing_letters},
     report::progress::Progress,
     text::number,
 };
@@ -53,32 +47,23 @@ pub struct FigureArgs {
 
 /// Runs the command.
 pub fn figure(args: FigureArgs) -> Result<()> {
-    let prints = args.paper.prints()?;
+    let mut prints = args.paper.prints()?;
     // In the paper's order, each once.
     let chosen = FIGURES.iter().filter(|figure| args.names.iter().any(|name| name == figure.name));
     let chosen: Vec<(&Figure, Spec)> = chosen.map(|figure| Ok((figure, figure.spec()?))).collect::<Result<_>>()?;
-    let names: Vec<String> =
-        chosen.iter().flat_map(|(figure, _)| files(figure, args.paper.on_screen(), &prints)).collect();
+    let files = |figure: &'static Figure| prints.extensions().chain(["csv"]).map(|of| file(figure, of));
+    let names: Vec<String> = chosen.iter().flat_map(|(figure, _)| files(figure)).collect();
     let folder = OutputFolder::open_for(&args.out, args.force, Owner::Figure, names.clone())?;
     if !args.quiet {
         note(SOLVED_DIRECTLY);
     }
     let (mut parts, mut made) = (Vec::new(), Vec::new());
-    let (printer, mut missing) = (Printer::default(), BTreeSet::new());
     for (figure, spec) in &chosen {
         let ended = figure.simulate(spec, Progress::new(args.quiet))?;
         let rows: Vec<NodeRow> = ended.rows.snapshots.iter().flat_map(NodeRow::of).collect();
         parts.push(Table::of(folder.file(&file(figure, "csv"))?, &rows)?);
         let plot = figure.plot(&ended);
-        if args.paper.on_screen() {
-            parts.push(folder.write(&file(figure, "svg"), plot.draw(Medium::Screen))?);
-        }
-        if !prints.formats.is_empty() {
-            let svg = plot.draw(Medium::Paper(prints.width.pixels()));
-            for (extension, content) in prints.of(&printer, (&plot.title, &svg), &mut missing)? {
-                parts.push(folder.write(&file(figure, extension), content)?);
-            }
-        }
+        parts.extend(prints.write(&folder, |of| file(figure, of), &plot.title, |medium| plot.draw(medium))?);
         made.push((*figure, ended));
         if !args.quiet {
             note(&format!("note: {}: {}", figure.name, figure.remark));
@@ -88,7 +73,7 @@ pub fn figure(args: FigureArgs) -> Result<()> {
     if args.quiet {
         return Ok(());
     }
-    missing_letters(&missing).iter().for_each(|missing_letters| note(&format!("note: {missing_letters}")));
+    prints.note_missing();
     print(&format!("{}\nresults  {}: {}\n", table(&made), args.out.display(), names.join(", ")))
 }
 
@@ -97,12 +82,6 @@ const SOLVED_DIRECTLY: &str = "note: solved directly where the paper sweeps (Gau
 
 fn file(figure: &Figure, extension: &str) -> String {
     format!("{}.{extension}", figure.name)
-}
-
-/// Pictures and data of a figure.
-fn files(figure: &Figure, on_screen: bool, prints: &Prints) -> Vec<String> {
-    let printed = prints.formats.iter().map(|(extension, _)| *extension);
-    on_screen.then_some("svg").into_iter().chain(printed).chain(["csv"]).map(|of| file(figure, of)).collect()
 }
 
 /// The table: each figure's run and its last curve.

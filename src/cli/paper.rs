@@ -1,13 +1,15 @@
 //! The flags of pictures for papers: `--format`, `--width`, `--dpi`.
 
-use std::collections::BTreeSet;
+use std::{cell::LazyCell, collections::BTreeSet};
 
 use clap::ValueEnum;
 
-use super::flags;
+use super::{flags, note};
 use crate::{
+    draw::medium::Medium,
     error::{Error, Result},
-    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI},
+    files::{OutputFolder, part_file::PartFile},
+    paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, missing_letters},
 };
 
 /// The formats of pictures.
@@ -38,12 +40,7 @@ impl PaperFlags {
         !self.format.is_empty() || self.width.is_some() || self.dpi.is_some()
     }
 
-    /// Whether the picture for screens is drawn.
-    pub(super) fn on_screen(&self) -> bool {
-        self.format.is_empty() || self.format.contains(&PictureFormat::Svg)
-    }
-
-    /// Returns what pictures for papers are made of.
+    /// Returns what pictures are made of.
     ///
     /// # Errors
     /// [`Error::Request`] for a wrong width or density, and for one that no format uses.
@@ -63,27 +60,68 @@ impl PaperFlags {
         }
         let formats = [(PictureFormat::Png, ("png", png)), (PictureFormat::Pdf, ("pdf", PaperFormat::Pdf))];
         let formats = formats.into_iter().filter(|(format, _)| has(*format)).map(|(_, paper)| paper).collect();
-        Ok(Prints { width, formats })
+        let on_screen = self.format.is_empty() || has(PictureFormat::Svg);
+        Ok(Prints { on_screen, formats, width, printer: LazyCell::new(Printer::default), missing: BTreeSet::new() })
     }
 }
 
-/// Pictures for papers, as they were asked for.
+/// Pictures in the formats that were asked for.
 pub(super) struct Prints {
-    pub(super) width: PaperWidth,
-    /// Extension and format.
-    pub(super) formats: Vec<(&'static str, PaperFormat)>,
+    /// Whether they are drawn for screens, as svg.
+    pub(super) on_screen: bool,
+    /// Extension and format of those for papers.
+    formats: Vec<(&'static str, PaperFormat)>,
+    width: PaperWidth,
+    printer: LazyCell<Printer>,
+    /// Letters that could not be drawn.
+    missing: BTreeSet<char>,
 }
 
 impl Prints {
-    /// A picture in each format: extension and bytes; letters that could not be drawn are added to `missing`.
-    pub(super) fn of(
-        &self,
-        printer: &Printer,
-        (title, svg): (&str, &str),
-        missing: &mut BTreeSet<char>,
-    ) -> Result<Vec<(&'static str, Vec<u8>)>> {
-        let print = printer.read(title, svg, self.width)?;
-        missing.append(&mut print.missing());
+    /// The extensions of those for papers.
+    pub(super) fn on_paper(&self) -> impl Iterator<Item = &'static str> {
+        self.formats.iter().map(|(extension, _)| *extension)
+    }
+
+    /// The extensions of all.
+    pub(super) fn extensions(&self) -> impl Iterator<Item = &'static str> {
+        self.on_screen.then_some("svg").into_iter().chain(self.on_paper())
+    }
+
+    /// Pixels across those for papers; none if there are none.
+    pub(super) fn pixels(&self) -> Option<f64> {
+        (!self.formats.is_empty()).then(|| self.width.pixels())
+    }
+
+    /// Writes what `draw` draws in each format, into the file that `name` gives for its extension.
+    pub(super) fn write(
+        &mut self,
+        folder: &OutputFolder,
+        name: impl Fn(&str) -> String,
+        title: &str,
+        draw: impl Fn(Medium) -> String,
+    ) -> Result<Vec<PartFile>> {
+        let mut files = Vec::new();
+        if self.on_screen {
+            files.push(folder.write(&name("svg"), draw(Medium::Screen))?);
+        }
+        if let Some(pixels) = self.pixels() {
+            for (extension, content) in self.of(title, &draw(Medium::Paper(pixels)))? {
+                files.push(folder.write(&name(extension), content)?);
+            }
+        }
+        Ok(files)
+    }
+
+    /// A picture in each format for papers: extension and bytes.
+    pub(super) fn of(&mut self, title: &str, svg: &str) -> Result<Vec<(&'static str, Vec<u8>)>> {
+        let print = self.printer.read(title, svg, self.width)?;
+        self.missing.append(&mut print.missing());
         self.formats.iter().map(|(extension, format)| Ok((*extension, print.file(*format)?))).collect()
+    }
+
+    /// Says which letters could not be drawn, if there are any.
+    pub(super) fn note_missing(&self) {
+        missing_letters(&self.missing).iter().for_each(|letters| note(&format!("note: {letters}")));
     }
 }

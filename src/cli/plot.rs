@@ -1,9 +1,6 @@
 //! `curvelax plot`: the pictures of a finished run, drawn again from its files.
 
-use std::{
-    collections::BTreeSet,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use super::{
     flags, note,
@@ -17,7 +14,6 @@ use crate::{
         part_file::PartFile,
         reader::{self, Finished},
     },
-    paper::{Printer, missing_letters},
     report::pictures::FinishedRun,
     results::EnsembleStatistics,
 };
@@ -58,37 +54,30 @@ pub struct PlotArgs {
 }
 
 impl Prints {
-    /// The files of plots that may be written.
+    /// The files of plots for papers that may be written.
     fn names(&self) -> impl Iterator<Item = String> {
-        let of = |(extension, _): &(&'static str, _)| {
-            let extension = *extension;
-            names::PICTURES.into_iter().filter_map(move |name| names::on_paper(name, extension))
-        };
-        self.formats.iter().flat_map(of)
+        let of = |extension| names::PICTURES.into_iter().filter_map(move |name| names::on_paper(name, extension));
+        self.on_paper().flat_map(of)
     }
 
-    /// Writes the pictures of a run; returns their files, and letters that could not be drawn.
-    fn write(&self, study: &FinishedRun, folder: &OutputFolder) -> Result<(Vec<PartFile>, BTreeSet<char>)> {
-        let (mut files, mut missing) = (Vec::new(), BTreeSet::new());
-        if self.formats.is_empty() {
-            return Ok((files, missing));
-        }
-        let printer = Printer::default();
-        for picture in study.on_paper(self.width.pixels())? {
-            let made = self.of(&printer, (&picture.title, &picture.svg), &mut missing)?;
-            for (extension, content) in made {
+    /// Writes the pictures of a run for papers.
+    fn write_run(&mut self, study: &FinishedRun, folder: &OutputFolder) -> Result<Vec<PartFile>> {
+        let mut files = Vec::new();
+        let Some(pixels) = self.pixels() else { return Ok(files) };
+        for picture in study.on_paper(pixels)? {
+            for (extension, content) in self.of(&picture.title, &picture.svg)? {
                 if let Some(name) = names::on_paper(picture.name, extension) {
                     files.push(folder.write(&name, content)?);
                 }
             }
         }
-        Ok((files, missing))
+        Ok(files)
     }
 }
 
 /// Runs the command.
 pub fn plot(args: PlotArgs) -> Result<()> {
-    let (prints, on_screen) = (args.paper.prints()?, args.paper.on_screen());
+    let mut prints = args.paper.prints()?;
     // Before the folder is opened, which would create a missing one.
     reader::provenance(&args.run)?;
     let (out, force, owner) = match &args.out {
@@ -96,7 +85,7 @@ pub fn plot(args: PlotArgs) -> Result<()> {
         Some(out) => (out, args.force, Owner::PicturesOfRun),
         None => (&args.run, true, Owner::PicturesOfRun),
     };
-    let names = names::PICTURES.into_iter().filter(|_| on_screen).map(String::from).chain(prints.names());
+    let names = names::PICTURES.into_iter().filter(|_| prints.on_screen).map(String::from).chain(prints.names());
     let folder = OutputFolder::open_for(out, force, owner, names.collect())?;
     let Finished { provenance, mut tally, excess, explained, films } = Finished::read(&args.run)?;
     if films.is_empty() && !args.quiet {
@@ -105,17 +94,16 @@ pub fn plot(args: PlotArgs) -> Result<()> {
     let statistics = &EnsembleStatistics::new(&provenance.spec, &mut tally)?;
     let (provenance, tally) = (&provenance, &tally);
     let study = FinishedRun { provenance, tally, statistics, excess: &excess, explained: &explained, films: &films };
-    let pictures = if on_screen { study.pictures()? } else { Vec::new() };
+    let pictures = if prints.on_screen { study.pictures()? } else { Vec::new() };
     let mut files: Vec<PartFile> =
         pictures.iter().map(|(name, text)| folder.write(name, text)).collect::<Result<_>>()?;
-    let (printed, missing) = prints.write(&study, &folder)?;
-    files.extend(printed);
+    files.extend(prints.write_run(&study, &folder)?);
     let names = files.iter().map(PartFile::name).collect::<Vec<_>>().join(", ");
     folder.publish_all(files)?;
     if args.quiet {
         return Ok(());
     }
-    missing_letters(&missing).iter().for_each(|missing_letters| note(&format!("note: {missing_letters}")));
+    prints.note_missing();
     print(&format!("results    {}: {names}\n", out.display()))
 }
 

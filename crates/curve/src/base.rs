@@ -1,4 +1,4 @@
-//! A shape ready for evaluation: a closed formula, a polygon or a spline, as a map of `u ∈ [0, 1]`.
+//! A shape ready for evaluation: a closed formula, or a spline, which may be a polygon, as a map of `u ∈ [0, 1]`.
 
 use std::sync::Arc;
 
@@ -22,8 +22,12 @@ pub struct BaseCurve {
 #[derive(Clone)]
 enum CurveKind {
     Formula(Arc<dyn Fn(f64) -> DVec2 + Send + Sync>),
-    Polygon(Arc<Outline>),
-    Spline { outline: Arc<Outline>, spline: Arc<Spline>, simple: bool },
+    /// A curve that was made from an outline: the polygon itself is a spline with corners alone.
+    Outline {
+        outline: Arc<Outline>,
+        spline: Arc<Spline>,
+        simple: bool,
+    },
 }
 
 impl BaseCurve {
@@ -44,8 +48,10 @@ impl BaseCurve {
     /// Creates the closed polygon of a file; `u` is the fraction of its length from the first vertex.
     pub fn from_outline(outline: impl Into<Arc<Outline>>) -> BaseCurve {
         let outline = outline.into();
-        let centroid = polygon::area_centroid(outline.vertices());
-        BaseCurve { kind: CurveKind::Polygon(outline), centroid, cusps: Vec::new() }
+        let (points, simple) = (outline.vertices(), outline.is_simple());
+        let centroid = polygon::area_centroid(points);
+        let spline = Spline::new(points, &vec![true; points.len()]).into();
+        BaseCurve { kind: CurveKind::Outline { outline, spline, simple }, centroid, cusps: Vec::new() }
     }
 
     /// Creates a curve that was made from an outline; `simple` says that it does not cross itself.
@@ -53,15 +59,14 @@ impl BaseCurve {
         let mut samples: Vec<DVec2> = spline.subdivision(CENTROID_SAMPLES).map(|(_, point)| point).collect();
         samples.pop();
         let centroid = polygon::area_centroid(&samples);
-        BaseCurve { kind: CurveKind::Spline { outline, spline: spline.into(), simple }, centroid, cusps: Vec::new() }
+        BaseCurve { kind: CurveKind::Outline { outline, spline: spline.into(), simple }, centroid, cusps: Vec::new() }
     }
 
     /// Returns whether it does not cross itself, as far as this is known: a formula counts as simple.
     pub fn is_simple(&self) -> bool {
         match &self.kind {
             CurveKind::Formula(_) => true,
-            CurveKind::Polygon(outline) => outline.is_simple(),
-            CurveKind::Spline { simple, .. } => *simple,
+            CurveKind::Outline { simple, .. } => *simple,
         }
     }
 
@@ -69,8 +74,7 @@ impl BaseCurve {
     pub fn point(&self, u: f64) -> DVec2 {
         match &self.kind {
             CurveKind::Formula(formula) => formula(u),
-            CurveKind::Polygon(outline) => outline.point(u),
-            CurveKind::Spline { spline, .. } => spline.point(u),
+            CurveKind::Outline { spline, .. } => spline.point(u),
         }
     }
 
@@ -88,7 +92,7 @@ impl BaseCurve {
     pub fn outline(&self) -> Option<&Arc<Outline>> {
         match &self.kind {
             CurveKind::Formula(_) => None,
-            CurveKind::Polygon(outline) | CurveKind::Spline { outline, .. } => Some(outline),
+            CurveKind::Outline { outline, .. } => Some(outline),
         }
     }
 
@@ -100,8 +104,7 @@ impl BaseCurve {
                 let at = move |j: usize| (j as f64 / pieces as f64, formula((j % pieces) as f64 / pieces as f64));
                 Box::new((0..=pieces).map(at))
             }
-            CurveKind::Polygon(outline) => Box::new(outline.subdivision(pieces)),
-            CurveKind::Spline { spline, .. } => Box::new(spline.subdivision(pieces)),
+            CurveKind::Outline { spline, .. } => Box::new(spline.subdivision(pieces)),
         }
     }
 }
@@ -129,5 +132,33 @@ mod tests {
         assert_eq!(samples.len(), 8);
         assert_eq!((samples[0].0, samples[7].0), (0.0, 1.0));
         assert_eq!(samples[0].1, samples[7].1);
+    }
+
+    fn polygon<const N: usize>(points: [(f64, f64); N]) -> BaseCurve {
+        BaseCurve::from_outline(Outline::from_points(&points.map(DVec2::from)).unwrap())
+    }
+
+    #[test]
+    fn the_parameter_of_a_polygon_is_its_share_of_the_length() {
+        let rectangle = polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (0.0, 1.0)]);
+        let expected = [(0.0, 0.0, 0.0), (0.25, 2.0, 0.0), (0.375, 3.0, 0.0), (0.5, 3.0, 1.0), (0.9375, 0.0, 0.5)];
+        for (u, x, y) in expected {
+            assert!(rectangle.point(u).distance(DVec2::new(x, y)) < 1e-15, "u = {u}");
+        }
+        assert_eq!(rectangle.point(1.0), rectangle.point(0.0));
+    }
+
+    #[test]
+    fn a_subdivision_contains_every_vertex_and_lies_on_the_polygon() {
+        let triangle = polygon([(0.0, 0.0), (10.0, 0.0), (0.0, 0.1)]);
+        for pieces in [1, 2, 50] {
+            let samples: Vec<_> = triangle.subdivision(pieces).collect();
+            assert!(samples.len() > pieces);
+            for vertex in triangle.outline().unwrap().vertices() {
+                assert!(samples.iter().any(|(_, p)| p == vertex), "{vertex} of {pieces}");
+            }
+            assert!(samples.windows(2).all(|pair| pair[0].0 < pair[1].0));
+            assert!(samples.iter().all(|(u, p)| triangle.point(*u).distance(*p) < 1e-14));
+        }
     }
 }

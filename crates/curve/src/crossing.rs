@@ -16,30 +16,24 @@ use glam::DVec2;
 /// fixed by the polygon but has no further meaning. The signs of areas are computed in f64 without error bounds, so
 /// a touch is exact only if its coordinates are.
 pub fn crossing(points: &[DVec2]) -> Option<(usize, usize)> {
-    search(points, u64::MAX).0
+    crossing_within(points, u64::MAX).unwrap_or_default()
 }
 
 /// Like [`crossing`], or returns [`Undecided`] after comparing `comparisons` pairs of boxes, some ten nanoseconds each.
 pub fn crossing_within(points: &[DVec2], comparisons: u64) -> Result<Option<(usize, usize)>, Undecided> {
-    match search(points, comparisons) {
-        (None, 0) => Err(Undecided),
-        (found, _) => Ok(found),
+    if points.len() < 3 {
+        return Ok(None);
+    }
+    let mut left = comparisons;
+    match BoxTree::over_edges(points).meeting_pair(1, 1, points, &mut left) {
+        None if left == 0 => Err(Undecided),
+        found => Ok(found),
     }
 }
 
 /// Unknown whether the polygon crosses itself: too many of its edges are side by side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Undecided;
-
-/// A meeting pair and the remaining comparisons; 0 means that the search was cut short.
-fn search(points: &[DVec2], comparisons: u64) -> (Option<(usize, usize)>, u64) {
-    let mut left = comparisons;
-    if points.len() < 3 {
-        return (None, left);
-    }
-    let found = BoxTree::over_edges(points).meeting_pair(1, 1, points, &mut left);
-    (found, left)
-}
 
 /// Returns the smallest distance between two strands of the polygon that run in opposite directions, or `limit` if that
 /// is less.

@@ -9,6 +9,7 @@
 use std::path::Path;
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 use super::{Undecided, crossing_within, polygon};
 use curvelax_base::{
@@ -36,12 +37,10 @@ const MAX_COMPARISONS: u64 = 50_000_000;
 /// Fewest points of an outline whose half says something about it.
 const MIN_HALVED: usize = 12;
 
-/// A closed counter-clockwise polygon, traversed by arclength.
-#[derive(Clone, Debug)]
+/// A closed counter-clockwise polygon.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Outline {
     vertices: Vec<DVec2>,
-    /// Length from vertex 0 to each vertex, and finally the total length.
-    reached: Vec<f64>,
     simple: bool,
     warnings: Vec<String>,
     digest: u32,
@@ -91,23 +90,12 @@ impl Outline {
             polygon::turn_round(&mut points);
         }
         let warnings = not_simple.iter().chain(&repeated).map(|said| source.said(&places.part, said)).collect();
-        Ok(Outline { simple: not_simple.is_none(), warnings, ..Outline::through(points) })
+        Ok(Outline { vertices: points, simple: not_simple.is_none(), warnings, digest: 0 })
     }
 
-    /// The polygon through valid points: counter-clockwise, no two neighbours equal.
-    fn through(vertices: Vec<DVec2>) -> Outline {
-        let mut reached = vec![0.0];
-        reached.extend(polygon::edges(&vertices).scan(0.0, |sum, edge| {
-            *sum += edge.length();
-            Some(*sum)
-        }));
-        Outline { vertices, reached, simple: true, warnings: Vec::new(), digest: 0 }
-    }
-
-    /// The outline that was taken apart into these parts; `None` if they cannot be those of one.
-    pub(super) fn of_parts(vertices: Vec<DVec2>, simple: bool, warnings: Vec<String>, digest: u32) -> Option<Outline> {
-        let valid = (3..=MAX_POINTS).contains(&vertices.len()) && vertices.iter().all(|point| point.is_finite());
-        valid.then(|| Outline { simple, warnings, digest, ..Outline::through(vertices) })
+    /// Returns whether its vertices, as they were saved, can be those of an outline.
+    pub fn is_possible(&self) -> bool {
+        (3..=MAX_POINTS).contains(&self.vertices.len()) && self.vertices.iter().all(|point| point.is_finite())
     }
 
     /// The same outline, read from a file whose bytes have the CRC-32C `digest`, with more to say about it.
@@ -146,35 +134,7 @@ impl Outline {
             return None;
         }
         let simple = self.simple && crossing_within(&points, MAX_COMPARISONS).is_ok_and(|found| found.is_none());
-        Some(Outline { simple, ..Outline::through(points) })
-    }
-
-    fn length(&self) -> f64 {
-        self.reached[self.vertices.len()]
-    }
-
-    /// Returns the point at the fraction `u ∈ [0, 1]` of the length, from the first vertex.
-    pub fn point(&self, u: f64) -> DVec2 {
-        let target = u * self.length();
-        let n = self.vertices.len();
-        let edge = self.reached[1..n].partition_point(|&reached| reached <= target);
-        let share = (target - self.reached[edge]) / (self.reached[edge + 1] - self.reached[edge]);
-        self.vertices[edge].lerp(self.vertices[(edge + 1) % n], share)
-    }
-
-    /// Returns `(u, point)` once round: every vertex, and between vertices pieces no longer than `length / pieces`.
-    pub(super) fn subdivision(&self, pieces: usize) -> impl Iterator<Item = (f64, DVec2)> {
-        let (n, length) = (self.vertices.len(), self.length());
-        let edge = move |i: usize| {
-            let (start, end) = (self.reached[i], self.reached[i + 1]);
-            let (a, b) = (self.vertices[i], self.vertices[(i + 1) % n]);
-            let parts = ((end - start) / length * pieces as f64).ceil().max(1.0);
-            (0..parts as usize).map(move |j| {
-                let share = j as f64 / parts;
-                ((start + share * (end - start)) / length, a.lerp(b, share))
-            })
-        };
-        (0..n).flat_map(edge).chain([(1.0, self.vertices[0])])
+        Some(Outline { vertices: points, simple, warnings: Vec::new(), digest: 0 })
     }
 }
 
@@ -224,13 +184,17 @@ impl Places {
 
     /// The place of the point at index `i`.
     pub(super) fn at(&self, i: usize) -> String {
-        let separator = if self.part.is_empty() { "" } else { ", " };
-        format!("{}{separator}{} {}", self.part, self.unit, self.number(i))
+        within(&self.part, &format!("{} {}", self.unit, self.number(i)))
     }
 
     fn holder(&self) -> &'static str {
         if self.part.is_empty() { "the file" } else { "it" }
     }
+}
+
+/// A place in a part of a file, which may be all of it.
+pub(super) fn within(part: &str, place: &str) -> String {
+    if part.is_empty() { place.to_owned() } else { format!("{part}, {place}") }
 }
 
 /// The file of an outline, for messages.
@@ -485,29 +449,5 @@ mod tests {
         // Every second point of a comb is on its back.
         let comb: String = (0..10).map(|i| format!("{i},{}\n", if i % 2 == 1 { 1 } else { 0 })).collect();
         assert!(outline(&format!("{comb}9,-1e-13\n4,-1\n")).unwrap().halved().is_none());
-    }
-
-    #[test]
-    fn the_parameter_of_a_polygon_is_its_share_of_the_length() {
-        let rectangle = outline("0,0\n3,0\n3,1\n0,1\n").unwrap();
-        let expected = [(0.0, 0.0, 0.0), (0.25, 2.0, 0.0), (0.375, 3.0, 0.0), (0.5, 3.0, 1.0), (0.9375, 0.0, 0.5)];
-        for (u, x, y) in expected {
-            assert!(rectangle.point(u).distance(DVec2::new(x, y)) < 1e-15, "u = {u}");
-        }
-        assert_eq!(rectangle.point(1.0), rectangle.point(0.0));
-    }
-
-    #[test]
-    fn a_subdivision_contains_every_vertex_and_lies_on_the_polygon() {
-        let triangle = outline("0,0\n10,0\n0,0.1\n").unwrap();
-        for pieces in [1, 2, 50] {
-            let samples: Vec<_> = triangle.subdivision(pieces).collect();
-            assert!(samples.len() > pieces);
-            for vertex in triangle.vertices() {
-                assert!(samples.iter().any(|(_, p)| p == vertex), "{vertex} of {pieces}");
-            }
-            assert!(samples.windows(2).all(|pair| pair[0].0 < pair[1].0));
-            assert!(samples.iter().all(|(u, p)| triangle.point(*u).distance(*p) < 1e-14));
-        }
     }
 }

@@ -16,9 +16,23 @@ pub fn edges(points: &[DVec2]) -> impl Iterator<Item = DVec2> + '_ {
     points.iter().zip(next).map(|(a, b)| *b - *a)
 }
 
+/// Each edge with the one after it.
+fn turns(points: &[DVec2]) -> impl Iterator<Item = (DVec2, DVec2)> {
+    edges(points).zip(edges(points).chain(edges(points)).skip(1))
+}
+
 /// Returns the length `L`.
 pub fn length(points: &[DVec2]) -> f64 {
     edges(points).map(DVec2::length).sum()
+}
+
+/// Returns the sums of the lengths of none, one, two and all pieces of a line.
+pub fn cumulated(lengths: impl Iterator<Item = f64>) -> Vec<f64> {
+    let sums = lengths.scan(0.0, |sum, length| {
+        *sum += length;
+        Some(*sum)
+    });
+    [0.0].into_iter().chain(sums).collect()
 }
 
 /// Returns the signed area `A = ½ Σ x_i × x_{i+1}`, positive counter-clockwise.
@@ -63,19 +77,17 @@ pub fn bounds(points: impl IntoIterator<Item = DVec2>) -> Option<(DVec2, DVec2)>
 /// positive x-axis upwards minus those that cross it downwards: integers and signs, no angle. A node that turns by
 /// exactly π has no sense of turning and is not counted.
 pub fn turning_number(points: &[DVec2]) -> i32 {
-    let next = edges(points).chain(edges(points)).skip(1);
     let crossing = |(d, e): (DVec2, DVec2)| match (d.y <= 0.0, e.y <= 0.0) {
         (true, false) if d.perp_dot(e) > 0.0 => 1,
         (false, true) if d.perp_dot(e) < 0.0 => -1,
         _ => 0,
     };
-    edges(points).zip(next).map(crossing).sum()
+    turns(points).map(crossing).sum()
 }
 
 /// Returns the largest angle by which the direction turns at a node, in radians, from 0 to π.
 pub fn largest_turn(points: &[DVec2]) -> f64 {
-    let next = edges(points).chain(edges(points)).skip(1);
-    edges(points).zip(next).map(|(d, e)| d.angle_to(e).abs()).fold(0.0, f64::max)
+    turns(points).map(|(d, e)| d.angle_to(e).abs()).fold(0.0, f64::max)
 }
 
 /// Returns the ratio of the longest to the shortest edge; infinite if an edge has no length.
@@ -92,9 +104,8 @@ const STRAIGHT: f64 = 1e-12;
 
 /// Returns whether the polygon is convex and counter-clockwise: it goes round once and turns right at no node.
 pub fn is_convex(points: &[DVec2]) -> bool {
-    let next = edges(points).chain(edges(points)).skip(1);
     let turns_right = |(d, e): (DVec2, DVec2)| d.perp_dot(e) < -STRAIGHT * d.length() * e.length();
-    turning_number(points) == 1 && !edges(points).zip(next).any(turns_right)
+    turning_number(points) == 1 && !turns(points).any(turns_right)
 }
 
 /// Reverses the orientation of the polygon and keeps its first vertex first.

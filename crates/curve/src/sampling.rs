@@ -11,13 +11,13 @@
 //! spaced. Spacings therefore differ by at most half a node per arc, and not at all if the arcs are equal and their
 //! number divides n.
 
-use std::{fmt, str::FromStr, sync::Arc};
+use std::sync::Arc;
 
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::{BaseCurve, MAX_POINTS, Outline, RadialFactor};
-use curvelax_base::error::{Error, did_you_mean, echo};
+use super::{BaseCurve, MAX_POINTS, Outline, RadialFactor, polygon};
+use curvelax_base::error::Error;
 
 /// Samples per node, and their minimum number, for measuring equal spacing. Halving it doubles the
 /// error of the spacing; the time to create a member is proportional to it.
@@ -28,7 +28,7 @@ const LARGEST_TABLE: usize = 64 << 20;
 
 /// How nodes are placed on a curve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(into = "String", try_from = "String")]
+#[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// At u = i/n, the paper's. On a file's polygon `u` is the fraction of its length before perturbation.
     Parameter,
@@ -37,38 +37,6 @@ pub enum Sampling {
     /// A file's own points, in its order.
     Points,
 }
-
-impl Sampling {
-    const ALL: [Sampling; 3] = [Sampling::Parameter, Sampling::Arclength, Sampling::Points];
-
-    /// Returns the word used on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Sampling::Parameter => "parameter",
-            Sampling::Arclength => "arclength",
-            Sampling::Points => "points",
-        }
-    }
-}
-
-impl fmt::Display for Sampling {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Sampling {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Sampling, String> {
-        Sampling::ALL.into_iter().find(|sampling| sampling.name() == text).ok_or_else(|| {
-            let names = Sampling::ALL.map(Sampling::name);
-            format!("unknown sampling `{}`{}; one of {}", echo(text), did_you_mean(text, names), names.join(", "))
-        })
-    }
-}
-
-curvelax_base::as_text!(Sampling);
 
 /// A base curve prepared for sampling into n nodes, whatever its perturbation.
 pub struct Sampler {
@@ -116,12 +84,8 @@ impl Sampler {
             (Sampling::Points, Some(outline)) => Plan::Fixed(outline.vertices().to_vec()),
             (Sampling::Points, None) => {
                 let problem = "only a file has points of its own";
-                return Err(Error::value(
-                    "sampling",
-                    sampling,
-                    problem,
-                    "use --shape file:PATH, parameter or arclength",
-                ));
+                let allowed = "use --shape file:PATH, parameter or arclength";
+                return Err(Error::value("sampling", "points", problem, allowed));
             }
         };
         let nodes = if let Plan::Fixed(points) = &plan { points.len() } else { nodes };
@@ -211,9 +175,7 @@ impl Sampler {
         };
         (1..self.nodes).map(parameter).chain([0.0]).map(|u| factor.apply(centre, self.curve.point(u))).collect()
     }
-}
 
-impl Sampler {
     /// Node number and length at the start, at each cusp and at the end, where node n is node 0 again.
     fn arcs(&self, walk: impl Iterator<Item = (f64, f64)>) -> Vec<(usize, f64)> {
         let (n, cusps) = (self.nodes, self.curve.cusps());
@@ -285,7 +247,7 @@ fn samples(curve: &BaseCurve, pieces: usize) -> impl Iterator<Item = CurvePoint>
 pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
     let n = nodes.len();
     let closed: Vec<DVec2> = nodes[n - 1..].iter().chain(nodes).copied().collect();
-    let reached = cumulated_length(&closed);
+    let reached = polygon::cumulated(closed.windows(2).map(|pair| pair[0].distance(pair[1])));
     let spacing = reached[n] / n as f64;
     let mut piece = 0;
     let at = |i: usize| {
@@ -298,25 +260,12 @@ pub fn resample(nodes: &[DVec2]) -> Vec<DVec2> {
     (1..n).map(at).chain([nodes[n - 1]]).collect()
 }
 
-/// Length along the polyline at each of its points, 0 at the first.
-fn cumulated_length(points: &[DVec2]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let steps = points.windows(2).map(|pair| pair[0].distance(pair[1]));
-    [0.0]
-        .into_iter()
-        .chain(steps.map(|step| {
-            sum += step;
-            sum
-        }))
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::{Shape, polygon};
+    use crate::Shape;
 
     fn sampler(shape: &str, sampling: Sampling, nodes: usize) -> Sampler {
         Sampler::new(shape.parse::<Shape>().unwrap().resolve().unwrap(), sampling, nodes).unwrap()
@@ -474,14 +423,5 @@ mod tests {
         assert!(refusal(Sampling::Points, 100).contains("--sampling points: only a file"));
         assert!(refusal(Sampling::Parameter, 0).contains("--points 0: out of range; allowed are 3 to 1000000"));
         assert!(refusal(Sampling::Arclength, usize::MAX).contains("--points"));
-    }
-
-    #[test]
-    fn a_sampling_prints_as_it_is_parsed_and_a_wrong_one_names_the_nearest() {
-        for sampling in Sampling::ALL {
-            assert_eq!(sampling.to_string().parse(), Ok(sampling));
-        }
-        let message = "arclenght".parse::<Sampling>().unwrap_err();
-        assert!(message.contains("did you mean `arclength`?") && message.contains("parameter, arclength, points"));
     }
 }

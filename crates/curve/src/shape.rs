@@ -82,14 +82,6 @@ impl Shape {
     /// [`Error::Request`] for numbers out of range, for everything that [`Outline::read`] refuses, and for files with
     /// several outlines.
     pub fn resolve(&self) -> Result<BaseCurve, Error> {
-        self.resolve_from(Path::new(""))
-    }
-
-    /// Like [`Shape::resolve`], with the path of a file relative to the directory `base`.
-    ///
-    /// # Errors
-    /// As [`Shape::resolve`].
-    pub fn resolve_from(&self, base: &Path) -> Result<BaseCurve, Error> {
         self.check().map_err(|message| Error::Request(format!("--shape {}: {message}", echo(self))))?;
         Ok(match self.clone() {
             Shape::Ellipse { a, b } => BaseCurve::from_formula(move |u| ellipse(a, b, u)),
@@ -98,16 +90,16 @@ impl Shape {
             Shape::Astroid => BaseCurve::from_formula(astroid).with_cusps(&[0.25, 0.5, 0.75]),
             Shape::Lemniscate { half_width } => BaseCurve::from_formula(move |u| lemniscate(half_width, u)),
             Shape::Flower(modes) => BaseCurve::from_formula(move |u| flower(&modes, u)),
-            Shape::File(path) => BaseCurve::from_outline(Outline::read_from(base, &path)?),
+            Shape::File(path) => BaseCurve::from_outline(Outline::read(&path)?),
             Shape::Files(pattern) => {
-                let [path] = &outlines::glob(base, &pattern)?[..] else {
+                let [path] = &outlines::glob(Path::new(""), &pattern)?[..] else {
                     let problem = "several files match, and one curve is expected";
                     return Err(Error::Request(format!(
                         "--shape files:{}: {problem}; give one of them",
                         echo_path(Path::new(&pattern))
                     )));
                 };
-                BaseCurve::from_outline(Outline::read_from(base, path)?)
+                BaseCurve::from_outline(Outline::read(path)?)
             }
         })
     }

@@ -18,6 +18,8 @@
 
 use glam::DVec2;
 
+use super::polygon;
+
 /// Largest turn of the direction at a point, in rad, that is not a corner: half a radian, about 29°. A circle needs 13
 /// points. Where the direction turns by more, points do not say what is between them.
 pub const MAX_SMOOTH_TURN: f64 = 0.5;
@@ -112,11 +114,7 @@ impl Spline {
             CubicPiece { start: points[i], end: points[next], bends: bends.map(|bend| bend * share) }
         };
         let pieces: Vec<CubicPiece> = (0..n).map(piece).collect();
-        let mut reached = vec![0.0];
-        reached.extend(pieces.iter().scan(0.0, |sum, piece| {
-            *sum += piece.length();
-            Some(*sum)
-        }));
+        let reached = polygon::cumulated(pieces.iter().map(CubicPiece::length));
         Spline { pieces, reached, corners: is_corner.iter().filter(|corner| **corner).count() }
     }
 
@@ -217,7 +215,6 @@ mod tests {
     use std::f64::consts::{PI, TAU};
 
     use super::*;
-    use crate::polygon;
 
     /// Points of an ellipse at distances of which every second one is half as large.
     fn ellipse(n: usize) -> Vec<DVec2> {

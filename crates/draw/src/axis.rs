@@ -177,17 +177,10 @@ impl Axis {
         let log = self.log_candidates(length).into_iter().find(|ticks| ticks.labelled.len() > 1 && fits(ticks));
         log.unwrap_or_else(|| {
             let first = tick_step((self.high - self.low) * LINE / length).max(if self.whole { 1.0 } else { 0.0 });
-            let mut steps = std::iter::successors(Some(first), |step| Some(tick_step(1.01 * step)));
-            let mut candidate = || self.linear(steps.next().unwrap_or(first));
-            let mut ticks = candidate();
+            let steps = std::iter::successors(Some(first), |step| Some(tick_step(1.01 * step))).take(12);
             // A step larger than the range gives at most one label.
-            for _ in 0..12 {
-                if fits(&ticks) {
-                    break;
-                }
-                ticks = candidate();
-            }
-            ticks
+            let fitting = steps.map(|step| self.linear(step)).find(fits);
+            fitting.unwrap_or_else(|| self.linear(tick_step(self.high - self.low)))
         })
     }
 

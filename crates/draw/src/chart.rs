@@ -105,10 +105,9 @@ impl Entry {
     /// Pixels of the sample before the label.
     fn sample(&self) -> f64 {
         match self.mark {
-            LegendMark::Marker(_) | LegendMark::Points | LegendMark::Up => 10.0,
-            LegendMark::HollowUp | LegendMark::Right | LegendMark::Stroke => 10.0,
+            LegendMark::Series | LegendMark::Dashed | LegendMark::Thin | LegendMark::Thick | LegendMark::Band => SAMPLE,
             LegendMark::More => 0.0,
-            _ => SAMPLE,
+            _ => 10.0,
         }
     }
 
@@ -116,8 +115,7 @@ impl Entry {
         let [x, y] = at.to_array().map(coordinate);
         let middle = at + DVec2::new(0.5 * self.sample(), 0.0);
         let line = format!("M{x} {y}h{SAMPLE}");
-        svg.open(&self.class);
-        match self.mark {
+        svg.group(&self.class, |svg| match self.mark {
             LegendMark::Series => svg.path("series", &line),
             LegendMark::Dashed => svg.path("dashed", &line),
             LegendMark::Thin => svg.path("thin", &line),
@@ -130,8 +128,7 @@ impl Entry {
             LegendMark::Right => svg.path("solid", &triangle_right(middle)),
             LegendMark::Stroke => svg.path("thin", &stroke(middle)),
             LegendMark::More => {}
-        }
-        svg.close();
+        });
     }
 }
 
@@ -185,13 +182,10 @@ impl Heading<'_> {
     /// Begins a picture with this heading and `body` pixels below it; returns where these begin.
     pub fn begin(&self, medium: Medium, body: f64) -> (Svg, f64) {
         let (full, room) = (medium.width(), medium.width() - 2.0 * MARGIN);
-        let (titles, lines) = match medium {
-            Medium::Screen | Medium::Page => {
-                let lines = self.sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
-                (wrapped(self.title, TITLE, room), lines)
-            }
-            Medium::Paper(_) => (Vec::new(), Vec::new()),
-        };
+        // On paper a caption has both.
+        let (title, sentences) = if medium.is_screen() { (self.title, &self.sentences[..]) } else { ("", &[][..]) };
+        let titles = wrapped(title, TITLE, room);
+        let lines: Vec<String> = sentences.iter().flat_map(|text| wrapped(text, SIZE, room)).collect();
         let rows = self.rows(room, medium);
         let above = [(titles.len(), TITLE_LINE), (lines.len(), LINE), (rows.len(), LEGEND_LINE)];
         let top = 22.0 + above.iter().map(|(count, height)| *count as f64 * height).sum::<f64>();
@@ -219,10 +213,8 @@ impl Heading<'_> {
     /// A picture with this heading that says why there is nothing to draw; [`reason`](super::empty::reason) finds it.
     pub fn nothing(&self, medium: Medium, reason: &str) -> String {
         let (mut svg, top) = self.begin(medium, 180.0);
-        svg.open(NOTHING);
         let size = DVec2::new(medium.width() - 2.0 * MARGIN, 180.0 - MARGIN);
-        say(&mut svg, DVec2::new(MARGIN, top), size, reason);
-        svg.close();
+        svg.group(NOTHING, |svg| say(svg, DVec2::new(MARGIN, top), size, reason));
         svg.finish()
     }
 
@@ -265,7 +257,7 @@ impl Heading<'_> {
 #[derive(Clone, Debug)]
 pub struct Panel<'a> {
     /// A line above it, or empty.
-    pub heading: &'a str,
+    pub heading: String,
     /// The upper left corner, in pixels.
     pub corner: DVec2,
     /// Width and height, in pixels.
@@ -317,18 +309,17 @@ impl Panel<'_> {
         trace::clipped(line, self.corner, self.end()).iter().map(|part| trace::path(part)).collect()
     }
 
-    /// Draws the axes.
-    pub fn draw(&self, svg: &mut Svg) {
+    /// Draws both axes.
+    pub fn draw_axes(&self, svg: &mut Svg) {
         self.draw_x(svg);
         self.draw_y(svg);
-        self.draw_frame(svg);
     }
 
     /// Draws the border and the heading.
     pub fn draw_frame(&self, svg: &mut Svg) {
         svg.rectangle("frame", self.corner, self.size, 0.0);
         let middle = self.corner.x + 0.5 * self.size.x;
-        svg.text_unless_empty("middle", DVec2::new(middle, self.corner.y - 8.0), self.heading);
+        svg.text_unless_empty("middle", DVec2::new(middle, self.corner.y - 8.0), &self.heading);
     }
 
     /// Draws grid, ticks, labels and name of the horizontal axis.
@@ -534,6 +525,13 @@ impl Colours {
         distinct.map(|(i, class)| Entry::new(class, mark, label(*i))).collect()
     }
 
+    /// Draws each curve that is shown, by its rank among these and its number, in a group of its colour.
+    pub fn each(&self, svg: &mut Svg, mut draw: impl FnMut(&mut Svg, usize, usize)) {
+        for (rank, (i, class)) in self.shown.iter().enumerate() {
+            svg.group(class, |svg| draw(svg, rank, *i));
+        }
+    }
+
     /// The marker of the curve drawn at this rank: ordered colours need no shapes.
     pub fn rank(&self, rank: usize) -> usize {
         if self.bar.is_some() { 0 } else { rank }
@@ -568,10 +566,9 @@ impl Colours {
         let step = panel.size.y / style::RAMP as f64;
         for i in 0..style::RAMP {
             let at = corner + DVec2::new(0.0, (style::RAMP - 1 - i) as f64 * step);
-            svg.open(&format!("r{i}"));
             // A slight overlap avoids seams.
-            svg.rectangle("solid", at, DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 }), 0.0);
-            svg.close();
+            let size = DVec2::new(BAR, step + if i > 0 { 0.5 } else { 0.0 });
+            svg.group(&format!("r{i}"), |svg| svg.rectangle("solid", at, size, 0.0));
         }
         let (ticks, names) = (bar.ticks_upwards(panel.size.y), self.names(panel.size.y));
         let labelled = if names.is_empty() { &ticks.labelled } else { &names };

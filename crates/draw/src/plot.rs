@@ -137,11 +137,11 @@ impl Plot {
 fn draw_legend(svg: &mut Svg, panel: &PlotPanel, left: DVec2, entries: usize) {
     for (i, curve) in panel.curves.iter().enumerate() {
         let at = left + DVec2::new((i % entries) as f64 * ENTRY, (i / entries) as f64 * LEGEND);
-        svg.open(&colour(i));
-        svg.path("line", &format!("M{} {}h24", coordinate(at.x), coordinate(at.y)));
-        svg.path("nodes", &dots(&[at + DVec2::new(4.0, 0.0), at + DVec2::new(20.0, 0.0)]));
-        svg.text("label", at + DVec2::new(30.0, 4.0), &curve.label);
-        svg.close();
+        svg.group(&colour(i), |svg| {
+            svg.path("line", &format!("M{} {}h24", coordinate(at.x), coordinate(at.y)));
+            svg.path("nodes", &dots(&[at + DVec2::new(4.0, 0.0), at + DVec2::new(20.0, 0.0)]));
+            svg.text("label", at + DVec2::new(30.0, 4.0), &curve.label);
+        });
     }
 }
 
@@ -211,11 +211,11 @@ impl Frame {
         }
         for (i, curve) in panel.curves.iter().enumerate() {
             let nodes: Vec<DVec2> = curve.nodes.iter().map(|node| place(*node)).collect();
-            svg.open(&format!("curve {}", colour(i)));
-            svg.path("line", &closed_path(&nodes));
             let spacing = polygon::length(&nodes) / nodes.len().max(1) as f64;
-            svg.path(if spacing < DENSE { "nodes dense" } else { "nodes" }, &dots(&nodes));
-            svg.close();
+            svg.group(&format!("curve {}", colour(i)), |svg| {
+                svg.path("line", &closed_path(&nodes));
+                svg.path(if spacing < DENSE { "nodes dense" } else { "nodes" }, &dots(&nodes));
+            });
         }
     }
 }

@@ -71,13 +71,10 @@ impl Svg {
         ));
     }
 
-    /// Begins a group, to be [closed](Svg::close).
-    pub fn open(&mut self, class: &str) {
+    /// Adds a group of all that `draw` adds.
+    pub fn group(&mut self, class: &str, draw: impl FnOnce(&mut Svg)) {
         self.line(format_args!("<g class=\"{class}\">"));
-    }
-
-    /// Ends the last group opened.
-    pub fn close(&mut self) {
+        draw(self);
         self.text.push_str("</g>\n");
     }
 

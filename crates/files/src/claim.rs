@@ -7,7 +7,7 @@
 use std::{
     fs::{File, TryLockError},
     io,
-    path::{Path, PathBuf},
+    path::Path,
     sync::Arc,
 };
 
@@ -26,13 +26,12 @@ pub const LOCK: &str = ".curvelax.lock";
 /// A folder that this process holds; released when dropped.
 #[derive(Debug)]
 pub struct Claim {
-    /// Where it was found.
-    path: PathBuf,
-    /// The folder that was opened there; nothing if the system opens no folders.
+    /// Where it was found, and the folder that was opened there.
+    place: Place,
+    /// That folder; nothing if the system opens no folders.
     folder: Option<Arc<File>>,
     /// Whether the folder itself is locked.
     whole: bool,
-    place: Place,
     lock: File,
 }
 
@@ -46,13 +45,10 @@ impl Claim {
                 Some(Ok(())) => true,
                 Some(Err(TryLockError::Error(_))) | None => false,
             };
-            let place = match &folder {
-                Some(folder) => Place::opened(path, Arc::clone(folder)),
-                None => Place::named(path),
-            };
+            let place = Place::opened(path, folder.as_ref());
             let lock = lock(&place).map_err(|e| io::Error::new(e.kind(), format!("{LOCK}: {e}")))?;
             let Some(lock) = lock else { return Ok(None) };
-            let claim = Claim { path: path.into(), folder, whole, place, lock };
+            let claim = Claim { place, folder, whole, lock };
             // The previous holder may have removed the folder or the file after they were opened here.
             if claim.is_there()? && claim.has_its_file()? {
                 return Ok(Some(claim));
@@ -67,11 +63,8 @@ impl Claim {
 
     /// Uses the absolute path from now on.
     pub fn make_absolute(&mut self) -> Result<()> {
-        self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
-        self.place = match &self.folder {
-            Some(folder) => Place::opened(&self.path, Arc::clone(folder)),
-            None => Place::named(&self.path),
-        };
+        let path = std::path::absolute(self.place.shown()).map_err(self.place.io("cannot find"))?;
+        self.place = Place::opened(&path, self.folder.as_ref());
         Ok(())
     }
 
@@ -80,11 +73,10 @@ impl Claim {
     /// # Errors
     /// [`Error::Lost`] if it is not.
     pub fn check(&self) -> Result<()> {
-        let path = self.path.display();
-        let cannot = Error::io("cannot find", &self.path);
+        let path = self.place.shown().display();
         let held = || if self.whole { Ok(true) } else { self.has_its_file() };
         match self.is_there().and_then(|there| Ok((there, held()?))) {
-            Err(e) => Err(cannot(e)),
+            Err(e) => Err(self.place.io("cannot find")(e)),
             Ok((true, true)) => Ok(()),
             Ok((false, _)) => Err(Error::Lost(format!(
                 "{path}: the folder was moved, removed or replaced during the run, and what is there now was not \
@@ -99,7 +91,7 @@ impl Claim {
 
     /// Whether the folder that is held is the one at its path.
     fn is_there(&self) -> io::Result<bool> {
-        self.folder.as_ref().map_or(Ok(true), |folder| lies_at(folder, &self.path))
+        self.folder.as_ref().map_or(Ok(true), |folder| lies_at(folder, self.place.shown()))
     }
 
     fn has_its_file(&self) -> io::Result<bool> {

@@ -4,7 +4,7 @@ use std::{path::Path, str::FromStr};
 
 use csv::StringRecord;
 
-use super::names::REMEDY;
+use super::names::spoilt;
 use curvelax_base::error::{Error, Result, shortened};
 use curvelax_ensemble::Status;
 use curvelax_flow::number::Precision;
@@ -42,24 +42,12 @@ impl Fields<'_> {
 
     /// A whole number; none if unknown.
     pub fn whole_or_none<T: FromStr>(&mut self) -> Result<Option<T>> {
-        match self.word() {
-            "" => Ok(None),
-            word => match word.parse() {
-                Ok(number) => Ok(Some(number)),
-                Err(_) => Err(self.unexpected("a whole number or nothing")),
-            },
-        }
+        self.or_none("a whole number", |word| word.parse().ok())
     }
 
     /// `true` or `false`; none if unknown.
     pub fn truth_or_none(&mut self) -> Result<Option<bool>> {
-        match self.word() {
-            "" => Ok(None),
-            word => match word.parse() {
-                Ok(truth) => Ok(Some(truth)),
-                Err(_) => Err(self.unexpected("true, false or nothing")),
-            },
-        }
+        self.or_none("true, false", |word| word.parse().ok())
     }
 
     /// The name of a status.
@@ -81,10 +69,15 @@ impl Fields<'_> {
 
     /// A float; none if unknown.
     pub fn number(&mut self) -> Result<Option<f64>> {
+        self.or_none("a number", |word| word.parse().ok().filter(|value: &f64| value.is_finite()))
+    }
+
+    /// A value that `parse` makes of a word; none if unknown.
+    fn or_none<T>(&mut self, expected: &str, parse: impl Fn(&str) -> Option<T>) -> Result<Option<T>> {
         match self.word() {
             "" => Ok(None),
-            word => match word.parse().ok().filter(|value: &f64| value.is_finite()) {
-                None => Err(self.unexpected("a number or nothing")),
+            word => match parse(word) {
+                None => Err(self.unexpected(&format!("{expected} or nothing"))),
                 known => Ok(known),
             },
         }
@@ -119,13 +112,8 @@ impl Fields<'_> {
     }
 
     fn refused(&self, field: usize, expected: &str) -> Error {
-        Error::Request(format!(
-            "{}, line {}, column {}: expected {expected}, found `{}`; {REMEDY}",
-            self.path.display(),
-            number_of(self.line),
-            self.names[field],
-            shortened(&self.line[field], SHOWN)
-        ))
+        let (line, column, found) = (number_of(self.line), &self.names[field], shortened(&self.line[field], SHOWN));
+        spoilt(self.path, &format!("line {line}, column {column}"), &format!("expected {expected}, found `{found}`"))
     }
 }
 

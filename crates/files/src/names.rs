@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use curvelax_base::error::Error;
+
 /// One row per member.
 pub const SUMMARY: &str = "summary.csv";
 /// Decay rates, one row per member that has one.
@@ -151,6 +153,12 @@ pub fn on_paper(name: &str, extension: &str) -> Option<String> {
 
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";
+
+/// The error that the file at `path` is not as a run wrote it, at `place` if that is not empty.
+pub(super) fn spoilt(path: &Path, place: &str, problem: &str) -> Error {
+    let comma = if place.is_empty() { "" } else { ", " };
+    Error::Request(format!("{}{comma}{place}: {problem}; {REMEDY}", path.display()))
+}
 
 /// The folder of the plots.
 pub const PLOTS: &str = "plots";

@@ -8,7 +8,7 @@ use std::{io, sync::Arc};
 
 use parquet::{
     basic::{Compression, LogicalType, Repetition, Type as Physical},
-    data_type::{BoolType, ByteArray, ByteArrayType, DataType, DoubleType, Int64Type},
+    data_type::{BoolType, ByteArrayType, DataType, DoubleType, Int64Type},
     errors::ParquetError,
     file::{
         properties::{EnabledStatistics, WriterProperties},
@@ -20,6 +20,8 @@ use parquet::{
 use super::{columns::ColumnText, fields::Fields, part_file::PartFile, place::Place, table_reader::LineReader};
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
+
+type ParquetResult<T> = std::result::Result<T, ParquetError>;
 
 /// Fields of a row group, which is in memory as a whole.
 const GROUP: usize = 1 << 19;
@@ -37,14 +39,15 @@ fn write_groups(csv: &Place, columns: &[ColumnText], spec: &Spec, file: PartFile
     let target = file.target().to_path_buf();
     let failed = |e: ParquetError| Error::io("cannot write", &target)(cause(e));
     let mut lines = LineReader::open(csv, columns.iter().map(|[name, ..]| name.clone()).collect())?;
-    let mut fields: Vec<FieldColumn> =
-        columns.iter().map(|[name, holds, _]| FieldColumn::new(name, holds, spec)).collect();
-    let schema = schema(columns, &fields).map_err(failed)?;
+    let mut fields: Vec<_> = columns.iter().map(|[name, holds, _]| column(name, holds, spec)).collect();
+    let described = columns.iter().zip(&fields).map(|([name, ..], column)| column.described(name));
+    let described = described.collect::<ParquetResult<_>>().map_err(failed)?;
+    let schema = Type::group_type_builder("table").with_fields(described).build().map_err(failed)?;
     let properties = WriterProperties::builder()
         .set_created_by(format!("curvelax {}", env!("CARGO_PKG_VERSION")))
         .set_compression(Compression::SNAPPY)
         .set_statistics_enabled(EnabledStatistics::Chunk);
-    let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties.build())).map_err(failed)?;
+    let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build())).map_err(failed)?;
     let most = (most / fields.len().max(1)).max(1);
     loop {
         let mut rows = 0;
@@ -64,10 +67,7 @@ fn write_groups(csv: &Place, columns: &[ColumnText], spec: &Spec, file: PartFile
     Ok(file)
 }
 
-fn add_group(
-    writer: &mut SerializedFileWriter<PartFile>,
-    fields: &mut [FieldColumn],
-) -> std::result::Result<(), ParquetError> {
+fn add_group(writer: &mut SerializedFileWriter<PartFile>, fields: &mut [Box<dyn FieldColumn>]) -> ParquetResult<()> {
     let mut group = writer.next_row_group()?;
     for column in fields {
         if let Some(mut own) = group.next_column()? {
@@ -86,109 +86,85 @@ fn cause(error: ParquetError) -> io::Error {
     }
 }
 
-fn schema(columns: &[ColumnText], fields: &[FieldColumn]) -> std::result::Result<TypePtr, ParquetError> {
-    let own = |([name, ..], column): (&ColumnText, &FieldColumn)| {
-        let (physical, logical, repetition) = match column.values {
-            ColumnValues::Whole(_) => (Physical::INT64, None, Repetition::OPTIONAL),
-            ColumnValues::Float(_) => (Physical::DOUBLE, None, Repetition::OPTIONAL),
-            ColumnValues::Truth(_) => (Physical::BOOLEAN, None, Repetition::OPTIONAL),
-            ColumnValues::Word(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String), Repetition::REQUIRED),
-        };
-        let column =
-            Type::primitive_type_builder(name, physical).with_logical_type(logical).with_repetition(repetition);
-        column.build().map(Arc::new)
-    };
-    let own = columns.iter().zip(fields).map(own).collect::<std::result::Result<_, _>>()?;
-    Type::group_type_builder("table").with_fields(own).build().map(Arc::new)
+/// The fields of a column in a row group.
+trait FieldColumn {
+    /// Its description.
+    fn described(&self, name: &str) -> ParquetResult<TypePtr>;
+
+    /// Reads the next field of a line.
+    fn read(&mut self, line: &mut Fields<'_>) -> Result<()>;
+
+    /// Writes the fields, and is empty then.
+    fn write(&mut self, column: &mut SerializedColumnWriter<'_>) -> ParquetResult<()>;
 }
 
-/// The fields of a column in a row group.
-struct FieldColumn {
+/// Those of one type.
+struct TypedColumn<T: DataType> {
+    next: fn(&mut Fields<'_>) -> Result<Option<T::T>>,
     /// Those that are known.
-    values: ColumnValues,
+    values: Vec<T::T>,
     /// For each row, 1 if its field is known.
     known: Vec<i16>,
 }
 
-enum ColumnValues {
-    Whole(Vec<i64>),
-    Float(Vec<f64>),
-    Truth(Vec<bool>),
-    Word(Vec<ByteArray>),
+impl<T: DataType> TypedColumn<T> {
+    fn boxed(next: fn(&mut Fields<'_>) -> Result<Option<T::T>>) -> Box<dyn FieldColumn> {
+        Box::new(TypedColumn::<T> { next, values: Vec::new(), known: Vec::new() })
+    }
+
+    /// Whether it holds words, which are always known.
+    fn has_words() -> bool {
+        T::get_physical_type() == Physical::BYTE_ARRAY
+    }
 }
 
-impl FieldColumn {
-    /// An empty column of the type that its description `holds`, or that the swept values of `name` have.
-    fn new(name: &str, holds: &str, spec: &Spec) -> FieldColumn {
-        let values = match holds {
-            "integer" => ColumnValues::Whole(Vec::new()),
-            "float" => ColumnValues::Float(Vec::new()),
-            "swept value" => spec
-                .sweep
-                .axes()
-                .iter()
-                .find(|axis| axis.key == name)
-                .map_or_else(ColumnValues::words, ColumnValues::swept),
-            _ => ColumnValues::words(),
+impl<T: DataType> FieldColumn for TypedColumn<T> {
+    fn described(&self, name: &str) -> ParquetResult<TypePtr> {
+        let (logical, repetition) = match Self::has_words() {
+            true => (Some(LogicalType::String), Repetition::REQUIRED),
+            false => (None, Repetition::OPTIONAL),
         };
-        FieldColumn { values, known: Vec::new() }
+        let column = Type::primitive_type_builder(name, T::get_physical_type());
+        column.with_logical_type(logical).with_repetition(repetition).build().map(Arc::new)
     }
 
     fn read(&mut self, line: &mut Fields<'_>) -> Result<()> {
-        let known = match &mut self.values {
-            ColumnValues::Whole(values) => add(values, line.whole_or_none()?),
-            ColumnValues::Float(values) => add(values, line.number()?),
-            ColumnValues::Truth(values) => add(values, line.truth_or_none()?),
-            ColumnValues::Word(values) => add(values, Some(line.word().as_bytes().to_vec().into())),
-        };
-        self.known.push(i16::from(known));
+        let value = (self.next)(line)?;
+        self.known.push(i16::from(value.is_some()));
+        self.values.extend(value);
         Ok(())
     }
 
-    /// Writes the fields, and is empty then.
-    fn write(&mut self, column: &mut SerializedColumnWriter<'_>) -> std::result::Result<(), ParquetError> {
-        let known = std::mem::take(&mut self.known);
-        match &mut self.values {
-            ColumnValues::Whole(values) => write_values::<Int64Type>(column, values, Some(&known)),
-            ColumnValues::Float(values) => write_values::<DoubleType>(column, values, Some(&known)),
-            ColumnValues::Truth(values) => write_values::<BoolType>(column, values, Some(&known)),
-            ColumnValues::Word(values) => write_values::<ByteArrayType>(column, values, None),
-        }
+    fn write(&mut self, column: &mut SerializedColumnWriter<'_>) -> ParquetResult<()> {
+        let known = Some(&self.known[..]).filter(|_| !Self::has_words());
+        column.typed::<T>().write_batch(&self.values, known, None)?;
+        self.values.clear();
+        self.known.clear();
+        Ok(())
     }
 }
 
-impl ColumnValues {
-    fn words() -> ColumnValues {
-        ColumnValues::Word(Vec::new())
-    }
-
-    /// As numbers if all values of a swept key are, and as integers if all are written as such.
-    fn swept(axis: &SweepAxis) -> ColumnValues {
-        let labels = axis.labels();
-        let all = |is: fn(&str) -> bool| labels.iter().all(|label| is(label));
-        match axis.numbers() {
-            Some(_) if all(|label| label.parse::<i64>().is_ok()) => ColumnValues::Whole(Vec::new()),
-            Some(_) => ColumnValues::Float(Vec::new()),
-            None if all(|label| label.parse::<bool>().is_ok()) => ColumnValues::Truth(Vec::new()),
-            None => ColumnValues::words(),
-        }
+/// An empty column of the type that its description `holds`, or that the swept values of `name` have.
+fn column(name: &str, holds: &str, spec: &Spec) -> Box<dyn FieldColumn> {
+    let axis = spec.sweep.axes().iter().find(|axis| axis.key == name);
+    match axis.filter(|_| holds == "swept value").map_or(holds, |axis| held_by(axis)) {
+        "integer" => TypedColumn::<Int64Type>::boxed(|line| line.whole_or_none()),
+        "float" => TypedColumn::<DoubleType>::boxed(|line| line.number()),
+        "truth" => TypedColumn::<BoolType>::boxed(|line| line.truth_or_none()),
+        _ => TypedColumn::<ByteArrayType>::boxed(|line| Ok(Some(line.word().as_bytes().to_vec().into()))),
     }
 }
 
-fn add<T>(values: &mut Vec<T>, value: Option<T>) -> bool {
-    let known = value.is_some();
-    values.extend(value);
-    known
-}
-
-fn write_values<T: DataType>(
-    column: &mut SerializedColumnWriter<'_>,
-    values: &mut Vec<T::T>,
-    known: Option<&[i16]>,
-) -> std::result::Result<(), ParquetError> {
-    column.typed::<T>().write_batch(values, known, None)?;
-    values.clear();
-    Ok(())
+/// What the values of a swept key are: numbers if all of them are, and integers if all are written as such.
+fn held_by(axis: &SweepAxis) -> &'static str {
+    let labels = axis.labels();
+    let all = |is: fn(&str) -> bool| labels.iter().all(|label| is(label));
+    match axis.numbers() {
+        Some(_) if all(|label| label.parse::<i64>().is_ok()) => "integer",
+        Some(_) => "float",
+        None if all(|label| label.parse::<bool>().is_ok()) => "truth",
+        None => "word",
+    }
 }
 
 #[cfg(test)]
@@ -238,7 +214,7 @@ mod tests {
         let path = home.path().join("table");
         std::fs::write(&path, bytes).unwrap();
         let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
-        let row = |row: std::result::Result<parquet::record::Row, ParquetError>| {
+        let row = |row: ParquetResult<parquet::record::Row>| {
             row.unwrap().get_column_iter().map(|(_, field)| field.clone()).collect()
         };
         (reader.get_row_iter(None).unwrap().map(row).collect(), reader.num_row_groups())

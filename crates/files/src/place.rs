@@ -28,10 +28,10 @@ impl Place {
         Place { at: path.into(), shown: path.into(), _folder: None }
     }
 
-    /// The folder that was opened at `path`, wherever it is now.
-    pub fn opened(path: &Path, folder: Arc<File>) -> Place {
-        match descriptor(&folder) {
-            Some(at) => Place { at, shown: path.into(), _folder: Some(folder) },
+    /// The folder that was opened at `path`, wherever it is now; as [`Place::named`] if the system opens no folders.
+    pub fn opened(path: &Path, folder: Option<&Arc<File>>) -> Place {
+        match folder.and_then(|folder| Some((descriptor(folder)?, Arc::clone(folder)))) {
+            Some((at, folder)) => Place { at, shown: path.into(), _folder: Some(folder) },
             None => Place::named(path),
         }
     }
@@ -101,7 +101,7 @@ mod tests {
         let home = tempfile::tempdir().unwrap();
         let [path, moved] = ["out", "moved"].map(|name| home.path().join(name));
         fs::create_dir(&path).unwrap();
-        let place = Place::opened(&path, Arc::new(File::open(&path).unwrap())).join("file");
+        let place = Place::opened(&path, Some(&Arc::new(File::open(&path).unwrap()))).join("file");
         fs::rename(&path, &moved).unwrap();
         fs::create_dir(&path).unwrap();
         fs::write(place.at(), "mine").unwrap();

@@ -8,7 +8,7 @@ use std::path::Path;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::names::{self, REMEDY};
+use super::names::{self, spoilt};
 use curvelax_base::{
     drawable::is_drawable,
     error::{Error, Result, plainly, shortened},
@@ -92,8 +92,7 @@ impl Film {
     /// The nodes at each time; their number is always the same.
     pub fn frames(&self) -> Vec<Vec<DVec2>> {
         let place = |digits: &[u8]| {
-            let [x, y] =
-                [0, 2].map(|at| f64::from(64 * u16::from(value(digits[at])) + u16::from(value(digits[at + 1]))));
+            let [x, y] = [0, 2].map(|at| (64 * value(digits[at]) + value(digits[at + 1])) as f64);
             DVec2::from_array(self.corner) + self.unit * DVec2::new(x, y)
         };
         self.nodes.iter().map(|text| text.as_bytes().chunks_exact(4).map(place).collect()).collect()
@@ -131,14 +130,10 @@ pub fn to_json(films: &[Film]) -> Result<String> {
 pub fn read(path: &Path) -> Result<Vec<Film>> {
     let text = input::text(path, input::MAX_PORTRAITS);
     let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let Portraits { members } = serde_json::from_str(&text).map_err(|e| {
-        let problem = shortened(&plainly(&e.to_string()), 200);
-        Error::Request(format!("{}: {problem}; {REMEDY}", path.display()))
-    })?;
+    let Portraits { members } =
+        serde_json::from_str(&text).map_err(|e| spoilt(path, "", &shortened(&plainly(&e.to_string()), 200)))?;
     match members.iter().find_map(|film| Some((film.member, film.fault()?))) {
-        Some((member, expected)) => {
-            Err(Error::Request(format!("{}, member {member}: expected {expected}; {REMEDY}", path.display())))
-        }
+        Some((member, expected)) => Err(spoilt(path, &format!("member {member}"), &format!("expected {expected}"))),
         None => Ok(members),
     }
 }
@@ -149,14 +144,8 @@ fn digits(coordinates: impl Iterator<Item = u16>) -> String {
 }
 
 /// The value of a digit.
-fn value(digit: u8) -> u8 {
-    match digit {
-        b'A'..=b'Z' => digit - b'A',
-        b'a'..=b'z' => digit - b'a' + 26,
-        b'0'..=b'9' => digit - b'0' + 52,
-        b'+' => 62,
-        _ => 63,
-    }
+fn value(digit: u8) -> usize {
+    DIGITS.iter().position(|own| *own == digit).unwrap_or_default()
 }
 
 #[cfg(test)]

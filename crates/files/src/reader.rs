@@ -9,7 +9,7 @@ use serde::Deserialize;
 use crate::{
     TableReader, TableRow, claim,
     members::MemberReader,
-    names::{self, REMEDY},
+    names::{self, REMEDY, spoilt},
     place::Place,
     portraits::{self, Film},
     tables::{EventLevelRow, EventRow},
@@ -205,8 +205,8 @@ fn expected(folder: &Path, name: &str, what: &str, expected: u64, found: u64) ->
     if expected == found {
         return Ok(());
     }
-    let (path, told) = (folder.join(name), names::RUN);
-    Err(Error::Request(format!("{}: expected {expected} {what} by {told}, found {found}; {REMEDY}", path.display())))
+    let problem = format!("expected {expected} {what} by {}, found {found}", names::RUN);
+    Err(spoilt(&folder.join(name), "", &problem))
 }
 
 /// The rows of a `summary.csv`, in order of ascending members.
@@ -289,12 +289,10 @@ impl<'a> Summary<'a> {
         if let Some((place, told, found)) = pairs.find(|(_, told, found)| told != found) {
             let shown =
                 |limit: Option<(f64, f64)>| limit.map_or("nothing".into(), |(t, error)| format!("{t} ± {error}"));
-            let (path, name, file) = (self.events.path.display(), &self.events.names[place], names::EVENT_LEVELS);
-            return Err(Error::Request(format!(
-                "{path}: expected the limit {} of the event {name} of member {member}, as {file} has it, found {}; {REMEDY}",
-                shown(found),
-                shown(told)
-            )));
+            let (found, told) = (shown(found), shown(told));
+            let (name, file) = (&self.events.names[place], names::EVENT_LEVELS);
+            let what = format!("the limit {found} of the event {name} of member {member}, as {file} has it");
+            return Err(spoilt(&self.events.path, "", &format!("expected {what}, found {told}")));
         }
         if outcome.points != points {
             return Err(fields.unexpected_in("points", &format!("{}, as {} has it", outcome.points, names::LEVELS)));
@@ -305,39 +303,24 @@ impl<'a> Summary<'a> {
 
 /// A row of a table of events.
 trait EventTime: TableRow + Default {
-    /// Its member and level, 0 if it has none.
-    fn of(&self) -> (u64, u64);
-    /// Its event.
-    fn event(&self) -> &str;
-    /// When that happened.
-    fn time(&self) -> Option<f64>;
+    /// Its member and level, 0 if it has none; its event; and when that happened.
+    fn parts(&self) -> ((u64, u64), &str, Option<f64>);
+
+    /// When its event happened.
+    fn time(&self) -> Option<f64> {
+        self.parts().2
+    }
 }
 
 impl EventTime for EventRow {
-    fn of(&self) -> (u64, u64) {
-        (self.member, 0)
-    }
-
-    fn event(&self) -> &str {
-        &self.event
-    }
-
-    fn time(&self) -> Option<f64> {
-        (self.censored == 0).then_some(self.t)
+    fn parts(&self) -> ((u64, u64), &str, Option<f64>) {
+        ((self.member, 0), &self.event, (self.censored == 0).then_some(self.t))
     }
 }
 
 impl EventTime for EventLevelRow {
-    fn of(&self) -> (u64, u64) {
-        (self.member, self.level)
-    }
-
-    fn event(&self) -> &str {
-        &self.event
-    }
-
-    fn time(&self) -> Option<f64> {
-        self.t
+    fn parts(&self) -> ((u64, u64), &str, Option<f64>) {
+        ((self.member, self.level), &self.event, self.t)
     }
 }
 
@@ -369,9 +352,9 @@ impl<R: EventTime> EventTimes<R> {
         if Some(of) <= self.last || of.0 >= self.members {
             return Ok(());
         }
-        let ([beside, own], member) = ([&self.beside, &self.path].map(|path| path.display()), of.0);
+        let (member, own) = (of.0, self.path.display());
         let problem = format!("expected another row of member {member}, which {own} has, found {found}");
-        Err(Error::Request(format!("{beside}: {problem}; {REMEDY}")))
+        Err(spoilt(&self.beside, "", &problem))
     }
 
     /// The rows of the events of the next member, which must be that of `place` and of which all must `fit`.
@@ -380,18 +363,18 @@ impl<R: EventTime> EventTimes<R> {
         let Some(table) = &mut self.table else { return Ok(rows) };
         for name in &self.names {
             let Some((row, fields)) = table.read()? else {
-                let (path, member) = (self.path.display(), place.0);
-                let problem = format!("expected the events of member {member}, found the end of the file");
-                return Err(Error::Request(format!("{path}: {problem}; {REMEDY}")));
+                let problem = format!("expected the events of member {}, found the end of the file", place.0);
+                return Err(spoilt(&self.path, "", &problem));
             };
-            if row.of() != place {
+            let (of, event, _) = row.parts();
+            if of != place {
                 let wrong = fields.unexpected_in("member", &format!("member {}, as the other table has it", place.0));
-                if row.of() < place {
-                    self.check_beside(row.of(), &format!("member {}", place.0))?;
+                if of < place {
+                    self.check_beside(of, &format!("member {}", place.0))?;
                 }
                 return Err(wrong);
             }
-            if row.event() != name {
+            if event != name {
                 return Err(fields.unexpected_in("event", name));
             }
             if !fits(&row) {
@@ -411,7 +394,7 @@ impl<R: EventTime> EventTimes<R> {
             None => Ok(()),
             Some((row, fields)) => {
                 let wrong = fields.unexpected_in("member", "the end of the file");
-                self.check_beside(row.of(), "the end of the file")?;
+                self.check_beside(row.parts().0, "the end of the file")?;
                 Err(wrong)
             }
         }
@@ -444,7 +427,7 @@ pub fn explained(place: &dyn Fn(&str) -> Place, spec: &Spec, of_limits: bool) ->
     while let Some((Outcome { member, cell, t_relax, t_half, t_limit, t_end, .. }, _)) = outcomes.read()? {
         let Some((own, of, mut fields)) = table.read()? else {
             let problem = format!("expected a row of member {member}, found the end");
-            return Err(Error::Request(format!("{}: {problem}; {REMEDY}", members.shown().display())));
+            return Err(spoilt(members.shown(), "", &problem));
         };
         for (name, told, found) in [("member", member, own), ("cell", cell, of)] {
             if told != found {

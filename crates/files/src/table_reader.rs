@@ -13,7 +13,7 @@ use csv::{ReaderBuilder, StringRecord};
 use super::{
     column::TableRow,
     fields::{Fields, number_of},
-    names::REMEDY,
+    names::{REMEDY, spoilt},
     place::Place,
 };
 use curvelax_base::{
@@ -71,7 +71,7 @@ impl LineReader {
             file.map_err(|e| Error::Request(format!("cannot read {}: {e}; {REMEDY}", path.display())))?;
         if let Some(line) = cut_off {
             let problem = "expected an end of line, found the end of the file: it was cut off";
-            return Err(Error::Request(format!("{}, line {line}: {problem}; {REMEDY}", path.display())));
+            return Err(spoilt(&path, &format!("line {line}"), problem));
         }
         // Rows are checked here, where messages can say more.
         let reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(Lines::new(file));
@@ -97,12 +97,12 @@ impl LineReader {
             };
             // The reader may fail at a line that it has not begun.
             let number = e.position().unwrap_or(reader.position()).line();
-            Error::Request(format!("{}, line {number}: {problem}; {REMEDY}", path.display()))
+            spoilt(path, &format!("line {number}"), &problem)
         })?;
         let (expected, found) = (names.len(), line.len());
         if some && found != expected {
-            let problem = format!("line {}: expected {expected} fields, found {found}", number_of(line));
-            return Err(Error::Request(format!("{}, {problem}; {REMEDY}", path.display())));
+            let problem = format!("expected {expected} fields, found {found}");
+            return Err(spoilt(path, &format!("line {}", number_of(line)), &problem));
         }
         Ok(some.then(|| Fields::new(path, names, line)))
     }

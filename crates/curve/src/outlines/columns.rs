@@ -10,8 +10,9 @@ pub(super) fn is_ring_column(name: &str) -> bool {
 }
 
 /// What separates columns.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Separator {
+    #[default]
     Comma,
     Semicolon,
     Tab,
@@ -100,7 +101,7 @@ pub(super) fn is_missing(field: &str) -> bool {
 }
 
 /// The columns, from 0, of the coordinates.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Columns {
     pub(super) separator: Separator,
     pub(super) x: usize,
@@ -117,16 +118,7 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn unnamed(separator: Separator) -> Columns {
-        Columns {
-            separator,
-            x: 0,
-            y: 1,
-            count: 2,
-            in_degrees: false,
-            has_both: false,
-            others: Vec::new(),
-            has_header: false,
-        }
+        Columns { separator, y: 1, count: 2, ..Columns::default() }
     }
 
     /// The columns of a header; `None` if it does not name the coordinates.

@@ -12,8 +12,8 @@ use glam::DVec2;
 use serde::{Deserialize, Deserializer};
 use serde_json::{Value, value::RawValue};
 
-use super::piece::{NoOutline, Piece, Properties, closed, label, outer_ring, outer_rings, property};
-use crate::outline::{Places, RingPoints, Source};
+use super::piece::{NoOutline, Piece, Properties, closed, each, label, of_polygons, outer_ring, outer_rings, property};
+use crate::outline::Source;
 use curvelax_base::error::{Error, Result, one_line, plainly, shortened};
 
 /// Maximum characters of foreign text in a message.
@@ -75,8 +75,8 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
     }
     let bare = !matches!(file.kind.as_deref(), Some("FeatureCollection" | "Feature"));
     let numbered = file.features.is_some();
-    let read = |(index, text)| read(source, index + 1, text, bare, numbered);
-    let mut pieces: Vec<Result<Piece>> = features.into_iter().enumerate().flat_map(read).collect();
+    let read = |(item, text)| read(source, item, text, bare, numbered);
+    let mut pieces = each((1..).zip(features).map(read));
     let (in_degrees, note) = match &file.crs {
         // Whoever writes null says that there is no system.
         Some(Value::Null) => (false, None),
@@ -108,7 +108,7 @@ fn names_degrees(crs: &Value) -> bool {
 }
 
 /// Reads the outlines of a feature, or of a bare geometry.
-fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> Vec<Result<Piece>> {
+fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> Result<Vec<Piece>> {
     let unnamed = if numbered { format!("feature {item}") } else { String::new() };
     let wrong = |e: serde_json::Error| {
         let said = one_line(&e.to_string());
@@ -118,14 +118,11 @@ fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> 
         source.refusal(&unnamed, &problem, "correct it as RFC 7946 says, or remove it")
     };
     let feature: Feature = match bare {
-        true => match serde_json::from_str::<geojson::Geometry>(text) {
-            Ok(geometry) => Feature { geometry: Some(geometry), ..Feature::default() },
-            Err(e) => return vec![Err(wrong(e))],
-        },
-        false => match serde_json::from_str(text) {
-            Ok(feature) => feature,
-            Err(e) => return vec![Err(wrong(e))],
-        },
+        true => {
+            let geometry = Some(serde_json::from_str(text).map_err(wrong)?);
+            Feature { geometry, ..Feature::default() }
+        }
+        false => serde_json::from_str(text).map_err(wrong)?,
     };
     let name = name(&feature);
     let part = match &name {
@@ -136,23 +133,13 @@ fn read(source: Source, item: usize, text: &str, bare: bool, numbered: bool) -> 
         None => Err(NoOutline::new("has no geometry", "give it a Polygon, or remove it")),
         Some(geometry) => rings(geometry.value),
     };
-    let rings = match rings {
-        Ok(rings) => rings,
-        Err(NoOutline { problem, remedy }) => {
-            let holder = if part.is_empty() { "the outline" } else { &*part };
-            return vec![Err(source.refusal("", &format!("{holder} {problem}"), remedy))];
-        }
-    };
+    let rings = rings.map_err(|NoOutline { problem, remedy }| {
+        let holder = if part.is_empty() { "the outline" } else { &*part };
+        source.refusal("", &format!("{holder} {problem}"), remedy)
+    })?;
     let properties: Properties = feature.properties.iter().flatten().filter_map(written).collect();
-    let several = rings.len() > 1;
-    let piece = |(index, points): (usize, Vec<DVec2>)| {
-        let separator = if part.is_empty() { "" } else { ", " };
-        let part = if several { format!("{part}{separator}polygon {}", index + 1) } else { part.clone() };
-        let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
-        let polygon = several.then_some(index + 1);
-        Ok(Piece { name: name.clone(), polygon, properties: properties.clone(), ..Piece::new(item, ring) })
-    };
-    rings.into_iter().enumerate().map(piece).collect()
+    let named = |piece| Piece { name: name.clone(), properties: properties.clone(), ..piece };
+    Ok(of_polygons(item, &part, rings).map(named).collect())
 }
 
 /// The name of a feature: its `id`, or a property that is usually one.

@@ -24,7 +24,6 @@ mod geojson;
 mod npy;
 mod piece;
 mod projection;
-mod saved;
 mod table;
 mod wkt;
 
@@ -37,9 +36,9 @@ use std::{
 };
 
 use ::glob::{MatchOptions, Pattern, glob_with};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use self::piece::Piece;
-pub use self::saved::SavedOutline;
 use super::{
     Outline,
     outline::{CROSSES, REPEATED, Source},
@@ -51,8 +50,8 @@ use curvelax_base::{
     text::count,
 };
 
-/// An outline with what its file says about it.
-#[derive(Clone, Debug)]
+/// An outline with what its file says about it. A run saves it, and resumes without the file.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Labelled {
     /// Its name, at most about 100 characters, different from those of all others that were read with it.
     pub label: String,
@@ -61,7 +60,16 @@ pub struct Labelled {
     /// The file, as it was named.
     pub file: PathBuf,
     /// The outline; its digest is that of the file.
+    #[serde(serialize_with = "save", deserialize_with = "restore")]
     pub outline: Arc<Outline>,
+}
+
+fn save<S: Serializer>(outline: &Arc<Outline>, to: S) -> std::result::Result<S::Ok, S::Error> {
+    outline.as_ref().serialize(to)
+}
+
+fn restore<'de, D: Deserializer<'de>>(from: D) -> std::result::Result<Arc<Outline>, D::Error> {
+    Outline::deserialize(from).map(Arc::new)
 }
 
 impl Labelled {
@@ -121,15 +129,7 @@ impl Outline {
     /// finite numbers, or longer than 65 536 bytes; neighbouring points coincide; no net area is enclosed. An outline
     /// that crosses itself is accepted with a warning.
     pub fn read(path: &Path) -> Result<Outline> {
-        Outline::read_from(Path::new(""), path)
-    }
-
-    /// Like [`Outline::read`], with `path` relative to the directory `base`; messages name only `path`.
-    ///
-    /// # Errors
-    /// As [`Outline::read`].
-    pub fn read_from(base: &Path, path: &Path) -> Result<Outline> {
-        let bytes = content(base, path)?;
+        let bytes = content(Path::new(""), path)?;
         let source = Source::new(path);
         only(source, Format::of(source, path, &bytes)?.read(source, path, &bytes)?)
     }

@@ -9,8 +9,8 @@ use glam::DVec2;
 use npyz::{DType, NpyFile, Order, TypeChar};
 use zip::ZipArchive;
 
-use super::piece::{Piece, label};
-use crate::outline::{Places, RingPoints, Source};
+use super::piece::{Piece, each, label};
+use crate::outline::{Places, RingPoints, Source, within};
 use curvelax_base::{
     error::{Error, Result, one_line, shortened},
     input::MAX_OUTLINE,
@@ -30,7 +30,7 @@ pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>> {
     let mut pieces = of_array(source, "", bytes)?;
     number(&mut pieces, 0);
-    Ok(pieces.into_iter().map(Ok).collect())
+    Ok(each([Ok(pieces)].into_iter()))
 }
 
 /// Reads the outlines of an `.npz` file, in the order of its arrays.
@@ -40,7 +40,7 @@ pub(super) fn pieces_of_zip(source: Source, bytes: &[u8]) -> Result<Vec<Result<P
         source.refusal(place, &problem, "save it by numpy.savez")
     };
     let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken("", e.to_string()))?;
-    let (mut pieces, mut left) = (Vec::new(), MAX_OUTLINE);
+    let (mut arrays, mut left) = (Vec::new(), MAX_OUTLINE);
     for index in 0..archive.len() {
         let entry = archive.by_index(index).map_err(|e| broken(&format!("array {}", index + 1), e.to_string()))?;
         let name = String::from_utf8_lossy(entry.name_raw()).into_owned();
@@ -52,19 +52,15 @@ pub(super) fn pieces_of_zip(source: Source, bytes: &[u8]) -> Result<Vec<Result<P
             let problem = format!("the arrays unpack to more than {}", text::bytes(MAX_OUTLINE));
             source.refusal(&place, &problem, "save fewer in one file")
         })?;
-        let outlines = of_array(source, &place, &array).map(|mut outlines| {
+        arrays.push(of_array(source, &place, &array).map(|mut outlines| {
             outlines.iter_mut().for_each(|piece| piece.name = label(name));
             number(&mut outlines, index);
             outlines
-        });
-        match outlines {
-            Ok(outlines) => pieces.extend(outlines.into_iter().map(Ok)),
-            Err(error) => pieces.push(Err(error)),
-        }
+        }));
     }
-    match pieces.is_empty() {
+    match arrays.is_empty() {
         true => Err(source.refusal("", "the file holds no arrays", "save them by numpy.savez")),
-        false => Ok(pieces),
+        false => Ok(each(arrays.into_iter())),
     }
 }
 
@@ -110,8 +106,7 @@ fn of_array(source: Source, place: &str, bytes: &[u8]) -> Result<Vec<Piece>> {
     }
     let several = spans.len() > 1;
     for (index, (block, span)) in spans.into_iter().enumerate() {
-        let separator = if place.is_empty() { "" } else { ", " };
-        let part = if several { format!("{place}{separator}outline {}", index + 1) } else { place.to_owned() };
+        let part = if several { within(place, &format!("outline {}", index + 1)) } else { place.to_owned() };
         let numbers = span.clone().collect();
         let places = Places { part, unit: "row", numbers };
         let ring = RingPoints::new(span.map(|row| coordinates.point(block, row)).collect(), places);

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use crate::outline::{MAX_LABEL, RingPoints};
-use curvelax_base::error::shortened;
+use crate::outline::{MAX_LABEL, Places, RingPoints, within};
+use curvelax_base::error::{Result, shortened};
 
 /// Properties of a feature, by name.
 pub type Properties = BTreeMap<String, String>;
@@ -34,6 +34,22 @@ impl Piece {
         let properties = Properties::new();
         Piece { name: None, item, polygon: None, properties, ring, in_degrees: false, notes: Vec::new() }
     }
+}
+
+/// The outlines of the polygons of a feature or line, which is `part` of its file: numbered if there are several.
+pub(super) fn of_polygons(item: usize, part: &str, rings: Vec<Vec<DVec2>>) -> impl Iterator<Item = Piece> {
+    let several = rings.len() > 1;
+    (1..).zip(rings).map(move |(number, points)| {
+        let part = if several { within(part, &format!("polygon {number}")) } else { part.to_owned() };
+        let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
+        Piece { polygon: several.then_some(number), ..Piece::new(item, ring) }
+    })
+}
+
+/// The outlines of all parts of a file, or why a part has none.
+pub(super) fn each(parts: impl Iterator<Item = Result<Vec<Piece>>>) -> Vec<Result<Piece>> {
+    let pieces = parts.map(|part| part.map_or_else(|e| vec![Err(e)], |pieces| pieces.into_iter().map(Ok).collect()));
+    pieces.flatten().collect()
 }
 
 /// Why a geometry is no outline, and what to do.

@@ -65,7 +65,9 @@ struct PointTable {
 
 /// Reads the outlines of a table.
 pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>> {
-    let (table, columns) = Reader { source }.table(bytes)?;
+    let mut reader = Reader { source, table: PointTable::default(), known: HashMap::new() };
+    let columns = reader.read(bytes)?;
+    let table = reader.table;
     table.check_commas(source)?;
     let columns = columns.unwrap_or(Columns::unnamed(Separator::Comma));
     let ring_columns = table.ring_columns(&columns);
@@ -187,14 +189,15 @@ fn place(line: usize) -> String {
 /// The reader of lines.
 struct Reader<'a> {
     source: Source<'a>,
+    table: PointTable,
+    /// The places of the words of the table.
+    known: HashMap<String, u32>,
 }
 
 impl Reader<'_> {
-    /// Parses the lines into points.
-    fn table(&self, bytes: &[u8]) -> Result<(PointTable, Option<Columns>)> {
-        let mut table = PointTable::default();
+    /// Parses the lines into points; returns the columns, if there is a line.
+    fn read(&mut self, bytes: &[u8]) -> Result<Option<Columns>> {
         let mut columns: Option<Columns> = None;
-        let mut known: HashMap<String, u32> = HashMap::new();
         for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
             if content.len() > MAX_LINE {
                 let most = text::bytes(MAX_LINE as u64);
@@ -207,7 +210,7 @@ impl Reader<'_> {
             let content = match str::from_utf8(content) {
                 Ok(content) => Cow::Borrowed(content),
                 Err(_) => {
-                    table.is_latin = true;
+                    self.table.is_latin = true;
                     Cow::Owned(content.iter().copied().map(char::from).collect())
                 }
             };
@@ -218,38 +221,32 @@ impl Reader<'_> {
             }
             if content.trim().is_empty() || content.starts_with('>') {
                 let kind = if content.starts_with('>') { Break::Missing } else { Break::Blank };
-                table.breaks.push((table.points.len(), kind));
+                self.table.breaks.push((self.table.points.len(), kind));
                 continue;
             }
             if columns.is_none() {
                 let opening = self.opening(line, content)?;
                 let is_header = opening.has_header;
-                table.others = vec![Vec::new(); opening.others.len()];
+                self.table.others = vec![Vec::new(); opening.others.len()];
                 columns = Some(opening);
                 if is_header {
                     continue;
                 }
             }
             let Some(columns) = &columns else { continue };
-            self.row(line, content, columns, &mut table, &mut known)?;
+            self.row(line, content, columns)?;
         }
-        Ok((table, columns))
+        Ok(columns)
     }
 
     /// Adds the point of a line.
-    fn row(
-        &self,
-        line: usize,
-        content: &str,
-        columns: &Columns,
-        table: &mut PointTable,
-        known: &mut HashMap<String, u32>,
-    ) -> Result<()> {
+    fn row(&mut self, line: usize, content: &str, columns: &Columns) -> Result<()> {
         let fields = columns.separator.split(content);
         let (Some(x), Some(y), false) = (fields.get(columns.x), fields.get(columns.y), fields.len() > columns.count)
         else {
             return Err(self.wrong_count(line, content, fields.len(), columns));
         };
+        let table = &mut self.table;
         if is_missing(x) && is_missing(y) {
             table.breaks.push((table.points.len(), Break::Missing));
             return Ok(());
@@ -258,10 +255,8 @@ impl Reader<'_> {
         if columns.others.is_empty() && table.points.len() - since == MAX_POINTS {
             self.source.check_number(&Places::lines(), MAX_POINTS + 1)?;
         }
-        let point = DVec2::new(
-            self.coordinate(line, x, columns, columns.x, table)?,
-            self.coordinate(line, y, columns, columns.y, table)?,
-        );
+        let point =
+            DVec2::new(self.coordinate(line, x, columns, columns.x)?, self.coordinate(line, y, columns, columns.y)?);
         // Other columns may be left out at the end of a row, as spreadsheets do. A ring without a name would be
         // another.
         let is_ring = |(name, at): &&(String, usize)| *at >= fields.len() && is_ring_column(name);
@@ -270,14 +265,15 @@ impl Reader<'_> {
             let problem = format!("the number of columns is {found} where the header names {all}: there is no {name}");
             return Err(self.source.refusal(&place(line), &problem, "complete the row"));
         }
+        let table = &mut self.table;
         table.points.push(point);
         table.lines.push(line);
         for ((_, column), values) in columns.others.iter().zip(&mut table.others) {
             let word = fields.get(*column).copied().unwrap_or_default().replace("\"\"", "\"");
-            let index = known.get(&word).copied().unwrap_or_else(|| {
+            let index = self.known.get(&word).copied().unwrap_or_else(|| {
                 let index = table.words.len() as u32;
                 table.words.push(word.clone());
-                known.insert(word, index);
+                self.known.insert(word, index);
                 index
             });
             values.push(index);
@@ -343,14 +339,8 @@ impl Reader<'_> {
     }
 
     /// The number in the column at the index `at`.
-    fn coordinate(
-        &self,
-        line: usize,
-        field: &str,
-        columns: &Columns,
-        at: usize,
-        table: &mut PointTable,
-    ) -> Result<f64> {
+    fn coordinate(&mut self, line: usize, field: &str, columns: &Columns, at: usize) -> Result<f64> {
+        let table = &mut self.table;
         let cell = || {
             let name = match (columns.has_header, at == columns.x, columns.in_degrees) {
                 (false, ..) => "",

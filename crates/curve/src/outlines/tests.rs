@@ -116,7 +116,7 @@ fn an_outline_is_the_same_in_every_format() {
         assert_eq!(all[0].outline.digest(), crc32c::crc32c(&bytes));
         let home = tempfile::tempdir().unwrap();
         fs::write(home.path().join(file), &bytes).unwrap();
-        assert_eq!(Outline::read_from(home.path(), Path::new(file)).unwrap().vertices().len(), 5);
+        assert_eq!(Outline::read(&home.path().join(file)).unwrap().vertices().len(), 5);
     }
 }
 
@@ -402,14 +402,15 @@ fn words_that_other_programs_misread_have_a_warning_with_the_remedy() {
 fn an_outline_is_read_below_a_directory_and_named_without_it() {
     let home = tempfile::tempdir().unwrap();
     fs::write(home.path().join("eight.csv"), "0,0\n2,2\n2,0\n0,1\n").unwrap();
-    let outline = Outline::read_from(home.path(), Path::new("eight.csv")).unwrap();
+    let all = read_all(home.path(), Path::new("eight.csv")).unwrap();
+    let outline = &all[0].outline;
     assert!(outline.warnings()[0].starts_with("eight.csv: the outline crosses"), "{:?}", outline.warnings());
-    let error = Outline::read_from(home.path(), Path::new("none.csv")).unwrap_err().to_string();
+    let error = read_all(home.path(), Path::new("none.csv")).unwrap_err().to_string();
     assert!(error.starts_with("--shape file:none.csv: there is no such file; "), "{error}");
     let denied = super::unread(Path::new("a.csv"), Path::new("/a.csv"), &std::io::ErrorKind::PermissionDenied.into());
     assert!(denied.to_string().starts_with("--shape file:a.csv: there is no permission to read it; "), "{denied}");
     // An absolute path ignores the base directory.
-    assert!(Outline::read_from(Path::new("/none"), &home.path().join("eight.csv")).is_ok());
+    assert!(read_all(Path::new("/none"), &home.path().join("eight.csv")).is_ok());
 }
 
 #[test]

@@ -9,8 +9,8 @@ use wkt::{
     types::{Coord, LineString, Polygon},
 };
 
-use super::piece::{NoOutline, Piece, closed, outer_ring, outer_rings};
-use crate::outline::{Places, RingPoints, Source};
+use super::piece::{NoOutline, Piece, closed, each, of_polygons, outer_ring, outer_rings};
+use crate::outline::Source;
 use curvelax_base::{
     error::{Result, shortened},
     text,
@@ -30,8 +30,7 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
     let text = String::from_utf8_lossy(bytes);
     let lines = (1..).zip(text.split('\n').map(str::trim));
     let lines = lines.filter(|(_, content)| !content.is_empty() && !content.starts_with('#'));
-    let pieces: Vec<_> =
-        (1..).zip(lines).flat_map(|(item, (line, content))| read(source, item, line, content)).collect();
+    let pieces = each((1..).zip(lines).map(|(item, (line, content))| read(source, item, line, content)));
     match pieces.is_empty() {
         true => Err(source.refusal(
             "",
@@ -43,23 +42,13 @@ pub(super) fn pieces(source: Source, bytes: &[u8]) -> Result<Vec<Result<Piece>>>
 }
 
 /// Reads the outlines of a line.
-fn read(source: Source, item: usize, line: usize, content: &str) -> Vec<Result<Piece>> {
+fn read(source: Source, item: usize, line: usize, content: &str) -> Result<Vec<Piece>> {
     let place = format!("line {line}");
     let (in_degrees, geometry) = without_srid(content);
-    let rings = match rings(geometry) {
-        Ok(rings) => rings,
-        Err(NoOutline { problem, remedy }) => {
-            let problem = format!("`{}` {problem}", shortened(content, SHOWN));
-            return vec![Err(source.refusal(&place, &problem, remedy))];
-        }
-    };
-    let several = rings.len() > 1;
-    let piece = |(index, points): (usize, Vec<DVec2>)| {
-        let part = if several { format!("{place}, polygon {}", index + 1) } else { place.clone() };
-        let ring = RingPoints { may_repeat: true, ..RingPoints::new(points, Places::points(part)) };
-        Ok(Piece { polygon: several.then_some(index + 1), in_degrees, ..Piece::new(item, ring) })
-    };
-    rings.into_iter().enumerate().map(piece).collect()
+    let rings = rings(geometry).map_err(|NoOutline { problem, remedy }| {
+        source.refusal(&place, &format!("`{}` {problem}", shortened(content, SHOWN)), remedy)
+    })?;
+    Ok(of_polygons(item, &place, rings).map(|piece| Piece { in_degrees, ..piece }).collect())
 }
 
 /// Whether the geometry is in degrees, and its text without the prefix that says so.

@@ -130,11 +130,7 @@ impl Bins {
         if let [bins] = all {
             return bins.draw(svg, panel);
         }
-        for (i, class) in &colours.shown {
-            svg.open(class);
-            all[*i].draw_outline(svg, panel);
-            svg.close();
-        }
+        colours.each(svg, |svg, _, i| all[i].draw_outline(svg, panel));
     }
 
     /// The largest count.
@@ -167,9 +163,7 @@ impl Bins {
             let [left, right, top, base] = [left + gap, right - gap, top, base].map(coordinate);
             data += &format!("M{left} {base}V{top}H{right}V{base}Z");
         }
-        svg.open("s0");
-        svg.path("bars", &data);
-        svg.close();
+        svg.group("s0", |svg| svg.path("bars", &data));
     }
 }
 

@@ -5,7 +5,7 @@ use glam::DVec2;
 use super::{Band, TIME, draw_band, only_panel, shows_bands};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel},
+    chart::{ChartText, Colours, Entry, LegendMark, Panel},
     medium::Medium,
     trace,
 };
@@ -123,26 +123,19 @@ impl Decay<'_> {
         }
         let bands = self.has_bands();
         heading.legend = self.legend(&colours, bands);
-        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
-
         let across = Axis::over("t", TIME, Scale::Linear, times()).with_zero();
         let upwards = self.excess(bands);
-        let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
-        panel.draw(&mut svg);
-        let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
-        for (i, class) in &colours.shown {
-            let curve = &curves[*i];
-            svg.open(class);
-            let band = curve.band.as_ref().filter(|_| bands);
-            draw_band(&mut svg, band, |bound| curve.line(bound, &panel, least, true));
-            svg.path("series", &panel.clipped(&curve.line(&curve.mean, &panel, least, false)));
-            svg.close();
-        }
-        svg.open("ink");
-        theory.iter().for_each(|theory| svg.path("dashed", &theory.law.line(&panel)));
-        svg.close();
-        colours.draw_bar(&mut svg, &panel);
-        svg.finish()
+        only_panel(&heading, medium, &colours, [&across, &upwards], HEIGHT, |svg, panel| {
+            panel.draw_frame(svg);
+            let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, panel.size.x);
+            colours.each(svg, |svg, _, i| {
+                let curve = &curves[i];
+                let band = curve.band.as_ref().filter(|_| bands);
+                draw_band(svg, band, |bound| curve.line(bound, panel, least, true));
+                svg.path("series", &panel.clipped(&curve.line(&curve.mean, panel, least, false)));
+            });
+            svg.group("ink", |svg| theory.iter().for_each(|theory| svg.path("dashed", &theory.law.line(panel))));
+        })
     }
 
     /// The vertical axis: all means above rounding, and the bands where they are near.

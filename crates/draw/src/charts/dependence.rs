@@ -2,22 +2,19 @@
 
 use glam::DVec2;
 
-use super::{TIME, only_panel};
+use super::{TIME, named_rows, only_panel, some};
 use crate::{
     axis::{Axis, Scale, range},
     chart::{
-        ChartText, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, MARGIN, Panel, draw_marker,
-        triangle_right, triangle_up,
+        ChartText, Colours, Entry, EstimatedNumber, FOOT, Heading, LegendMark, Panel, draw_marker, triangle_right,
+        triangle_up,
     },
     medium::Medium,
     svg::{Svg, coordinate},
     trace,
-    width::{SIZE, shortened, width},
+    width::{SIZE, shortened},
 };
-use curvelax_base::{
-    interval::Interval,
-    text::{count, significant},
-};
+use curvelax_base::{interval::Interval, text::significant};
 
 const HEIGHT: f64 = 300.0;
 /// Height of a named setting with one series, and the height each further series adds.
@@ -193,12 +190,8 @@ impl Dependence<'_> {
 
     /// A sentence about cells without a median.
     fn missing(&self) -> String {
-        match self.levels().filter(|level| level.median.is_none()).count() {
-            0 => String::new(),
-            missing => {
-                format!("{} without a median: fewer than half of the members relaxed.", count(missing as u64, "cell"))
-            }
-        }
+        let missing = self.levels().filter(|level| level.median.is_none()).count();
+        some(missing, "cell", "without a median: fewer than half of the members relaxed.")
     }
 
     /// The scale of an axis of these values: logarithmic if there is a power law, where all values allow it.
@@ -221,32 +214,25 @@ impl Dependence<'_> {
         let settings: Vec<f64> = self.levels().filter_map(DependencePoint::number).collect();
         let across = Axis::over(self.key, "", self.scale(&settings), settings);
         let time = self.time_axis();
-        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
-        let panel = only_panel(&svg, [&across, &time], top, HEIGHT, colours.room(HEIGHT));
-        panel.draw(&mut svg);
-        for (rank, (i, class)) in colours.shown.iter().enumerate() {
-            let series = &self.series[*i];
-            let aside = match colours.bar {
-                Some(_) => 0.0,
-                None => {
-                    let others = colours.shown.len() as f64 - 1.0;
-                    (SPREAD / others.max(1.0)).min(ASIDE) * (rank as f64 - 0.5 * others)
+        only_panel(heading, medium, colours, [&across, &time], HEIGHT, |svg, panel| {
+            panel.draw_frame(svg);
+            colours.each(svg, |svg, rank, i| {
+                let others = colours.shown.len() as f64 - 1.0;
+                let aside = match colours.bar {
+                    Some(_) => 0.0,
+                    None => (SPREAD / others.max(1.0)).min(ASIDE) * (rank as f64 - 0.5 * others),
+                };
+                svg.path("dashed", &self.series[i].line(panel));
+                for level in &self.series[i].levels {
+                    let Some(x) = level.number() else { continue };
+                    let x = (panel.across(x) + aside).clamp(panel.corner.x, panel.end().x);
+                    level.draw(svg, &time, colours.rank(rank), &|t| DVec2::new(x, panel.height(t)));
+                    if level.median.is_none() {
+                        svg.path("solid", &triangle_up(DVec2::new(x, panel.corner.y + 8.0)));
+                    }
                 }
-            };
-            svg.open(class);
-            svg.path("dashed", &series.line(&panel));
-            for level in &series.levels {
-                let Some(x) = level.number() else { continue };
-                let x = (panel.across(x) + aside).clamp(panel.corner.x, panel.end().x);
-                level.draw(&mut svg, &time, colours.rank(rank), &|t| DVec2::new(x, panel.height(t)));
-                if level.median.is_none() {
-                    svg.path("solid", &triangle_up(DVec2::new(x, panel.corner.y + 8.0)));
-                }
-            }
-            svg.close();
-        }
-        colours.draw_bar(&mut svg, &panel);
-        svg.finish()
+            });
+        })
     }
 
     /// Draws named settings one below the other, with time across, so that names are not rotated.
@@ -268,37 +254,34 @@ impl Dependence<'_> {
 
         let (time, most) = (self.time_axis(), medium.name(MAX_NAME));
         let shown: Vec<String> = names.iter().map(|name| shortened(name, SIZE, most)).collect();
-        let left =
-            MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(self.key, SIZE), f64::max).min(most);
-        let rows = Axis::new("", "", Scale::Linear, (0.0, names.len() as f64));
-        let size = DVec2::new(svg.width() - left - MARGIN - colours.room(height), height);
-        let corner = DVec2::new(left, top + 28.0);
-        let panel = Panel { heading: "", corner, size, x: &time, y: &rows, labels_x: true };
-        panel.draw_x(&mut svg);
         let key = shortened(self.key, SIZE, most);
+        let rows = Axis::new("", "", Scale::Linear, (0.0, names.len() as f64));
+        let (extent, room) = ((top + 28.0, height), colours.room(height));
+        let panel = named_rows(&mut svg, [&time, &rows], (&shown, &key), extent, room);
+        let left = panel.corner.x;
         svg.text("note end", DVec2::new(left - 8.0, panel.corner.y - 9.0), &key);
         let middle = |i: usize| panel.corner.y + (i as f64 + 0.5) * row;
         for (i, name) in shown.iter().enumerate() {
             svg.text("y tick end", DVec2::new(left - 8.0, middle(i) + 4.0), name);
         }
         let lines: String = (1..names.len())
-            .map(|i| format!("M{} {}h{}", coordinate(left), coordinate(middle(i) - 0.5 * row), coordinate(size.x)))
+            .map(|i| {
+                format!("M{} {}h{}", coordinate(left), coordinate(middle(i) - 0.5 * row), coordinate(panel.size.x))
+            })
             .collect();
         svg.path("grid", &lines);
-        for (rank, (i, class)) in colours.shown.iter().enumerate() {
+        colours.each(&mut svg, |svg, rank, i| {
             let apart = (row - 14.0) / colours.shown.len() as f64;
             let aside = apart * (rank as f64 - 0.5 * (colours.shown.len() as f64 - 1.0));
-            svg.open(class);
-            for level in &self.series[*i].levels {
+            for level in &self.series[i].levels {
                 let Some(at) = names.iter().position(|name| *name == level.name()) else { continue };
                 let y = middle(at) + aside;
-                level.draw(&mut svg, &time, colours.rank(rank), &|t| DVec2::new(panel.across(t), y));
+                level.draw(svg, &time, colours.rank(rank), &|t| DVec2::new(panel.across(t), y));
                 if level.median.is_none() {
                     svg.path("solid", &triangle_right(DVec2::new(panel.end().x - 8.0, y)));
                 }
             }
-            svg.close();
-        }
+        });
         panel.draw_frame(&mut svg);
         colours.draw_bar(&mut svg, &panel);
         svg.finish()

@@ -5,22 +5,20 @@
 
 use glam::DVec2;
 
-use super::{PanelGrid, TIME};
+use super::{GRID_HEIGHT, PanelGrid, TIME, named_rows};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, MARGIN, Panel},
+    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel},
     empty::say,
     medium::Medium,
     svg::{Svg, coordinate, dots},
-    width::{SIZE, distinct, shortened, width},
+    width::{SIZE, distinct},
 };
 use curvelax_base::text::significant;
 
-/// Height of a row of the boxes, of a box in it, and of a panel of quantiles.
+/// Height of a row of the boxes, and of a box in it.
 const ROW: f64 = 20.0;
 const BOX: f64 = 11.0;
-const HEIGHT: f64 = 200.0;
-const GAP: f64 = 14.0;
 /// Maximum width of the name of a cell.
 const NAME: f64 = 150.0;
 /// Between the quartiles of the normal law.
@@ -74,9 +72,8 @@ impl CellQuantiles {
             let shown = place.filter(|t| Scale::Linear.holds(*t)).map(|t| significant(t, 4));
             shown.unwrap_or("unknown".into())
         });
-        svg.open("thin");
-        svg.hinted_path(&lines, &format!("{name}: 5, 25, 50, 75, 95 %: {}", shown.join(", ")));
-        svg.close();
+        let hint = format!("{name}: 5, 25, 50, 75, 95 %: {}", shown.join(", "));
+        svg.group("thin", |svg| svg.hinted_path(&lines, &hint));
         if let Some(median) = known(2) {
             svg.path("cross", &format!("M{} {top}V{bottom}", coordinate(median)));
         }
@@ -103,7 +100,7 @@ impl TimeDistribution<'_> {
         groups.retain(|(_, cells)| all.iter().any(|all| cells.iter().any(|(cell, _)| !all[*cell].is_empty())));
         // Where no quartiles are known, there is nothing to compare with a law.
         let compared = all.iter().any(|all| !all.iter().all(Vec::is_empty));
-        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, 0.0);
+        let places = PanelGrid::new(medium, 0.0);
         let laws = if compared { places.height(2 * groups.len()) } else { 0.0 };
         let above = if rows > 1 { 24.0 } else { 8.0 };
         let (mut svg, top) = heading.begin(medium, above + boxes + FOOT + laws);
@@ -111,28 +108,23 @@ impl TimeDistribution<'_> {
         let own: Vec<String> = colours.shown.iter().map(|(i, _)| text.key.names[*i].clone()).collect();
         let names = if rows > 1 { distinct(&own, SIZE, medium.name(NAME)) } else { vec![String::new(); rows] };
         let keys = if rows > 1 { *keys } else { "" };
-        let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(keys, SIZE), f64::max);
         let scale = Scale::of(times());
         let across = Axis::over(&text.quantity, TIME, scale, times());
         let nothing = Axis::new("", "", Scale::Linear, (0.0, 1.0));
-        let (corner, size) = (DVec2::new(left, top + above), DVec2::new(svg.width() - left - MARGIN, boxes));
-        let panel = Panel { heading: "", corner, size, x: &across, y: &nothing, labels_x: true };
-        panel.draw_x(&mut svg);
-        svg.text_unless_empty("note end", DVec2::new(left - 6.0, corner.y - 8.0), keys);
+        let panel = named_rows(&mut svg, [&across, &nothing], (&names, keys), (top + above, boxes), 0.0);
+        let corner = panel.corner - DVec2::new(6.0, 0.0);
+        svg.text_unless_empty("note end", corner - DVec2::new(0.0, 8.0), keys);
         for (row, (name, (cell, class))) in names.iter().zip(&colours.shown).enumerate() {
             let y = corner.y + 4.0 + ROW * (row as f64 + 0.5);
-            svg.text_unless_empty("y tick end", DVec2::new(left - 6.0, y + 4.0), name);
-            svg.open(class);
-            cells[*cell].draw(&mut svg, &panel, y, &own[row]);
-            svg.close();
+            svg.text_unless_empty("y tick end", DVec2::new(corner.x, y + 4.0), name);
+            svg.group(class, |svg| cells[*cell].draw(svg, &panel, y, &own[row]));
         }
         panel.draw_frame(&mut svg);
 
         if compared {
             let below = corner.y + boxes + FOOT;
-            for (i, (name, cells)) in groups.iter().enumerate() {
-                let corners = [2 * i, 2 * i + 1].map(|i| DVec2::new(0.0, below) + places.corner(i));
-                self.draw_laws(medium, &mut svg, (corners, places.width), name, cells, &all);
+            for (i, group) in groups.iter().enumerate() {
+                self.draw_laws(medium, &mut svg, &places, (2 * i, below), group, &all);
             }
         }
         svg.finish()
@@ -149,14 +141,14 @@ impl TimeDistribution<'_> {
         all.filter(|(_, cells)| !cells.is_empty()).collect()
     }
 
-    /// Quantiles of some cells against those of the two laws, in panels `side` wide with their labels.
+    /// Quantiles of some cells against those of the two laws, in two panels from `first` on.
     fn draw_laws(
         &self,
         medium: Medium,
         svg: &mut Svg,
-        (corners, side): ([DVec2; 2], f64),
-        name: &str,
-        cells: &[&(usize, String)],
+        places: &PanelGrid,
+        (first, top): (usize, f64),
+        (name, cells): &(&str, Vec<&(usize, String)>),
         all: &[Vec<Vec<(f64, f64)>>; 2],
     ) {
         let own = |all: &Vec<Vec<(f64, f64)>>| -> Vec<(f64, f64)> {
@@ -168,30 +160,24 @@ impl TimeDistribution<'_> {
             Axis::over(name, "", Scale::Linear, own(all).into_iter().map(|(_, y)| y))
         };
         let upwards = [axis("standardised quantile", &all[0]), axis("standardised quantile of ln", &all[1])];
-        let left = upwards.iter().map(|axis| Panel::left(axis, HEIGHT)).fold(0.0, f64::max);
-        for (((law, all), own_axis), corner) in ["normal", "lognormal"].iter().zip(all).zip(&upwards).zip(corners) {
-            let corner = corner + DVec2::new(left, HEADING);
-            let size = DVec2::new(side - left, HEIGHT);
+        let left = upwards.iter().map(|axis| Panel::left(axis, GRID_HEIGHT)).fold(0.0, f64::max);
+        for (i, ((law, all), own_axis)) in (first..).zip(["normal", "lognormal"].iter().zip(all).zip(&upwards)) {
             let heading = match medium {
                 _ if name.is_empty() => law.to_string(),
                 // The axes say which side is which.
-                _ if medium.is_screen() => name.into(),
+                _ if medium.is_screen() => name.to_string(),
                 _ => format!("{name}, {law}"),
             };
-            let heading = shortened(&heading, SIZE, size.x);
-            let panel = Panel { heading: &heading, corner, size, x: &normal, y: own_axis, labels_x: true };
+            let panel = places.panel(i, top, left, &heading, [&normal, own_axis]);
             if own(all).is_empty() {
-                say(svg, corner, size, "The quartiles are not known, or equal.");
+                say(svg, panel.corner, panel.size, "The quartiles are not known, or equal.");
                 continue;
             }
-            panel.draw_x(svg);
-            panel.draw_y(svg);
+            panel.draw_axes(svg);
             self.diagonal(svg, &panel);
             for (cell, class) in cells {
                 let places: Vec<DVec2> = all[*cell].iter().map(|(z, y)| panel.place(*z, *y)).collect();
-                svg.open(class);
-                svg.path("points", &dots(&places));
-                svg.close();
+                svg.group(class, |svg| svg.path("points", &dots(&places)));
             }
             panel.draw_frame(svg);
         }
@@ -203,8 +189,6 @@ impl TimeDistribution<'_> {
         let (low, high) = (x0.max(y0), x1.min(y1));
         let [start, end] = [low, high].map(|v| panel.place(v, v));
         let [sx, sy, ex, ey] = [start.x, start.y, end.x, end.y].map(coordinate);
-        svg.open("faint");
-        svg.path("dashed", &format!("M{sx} {sy}L{ex} {ey}"));
-        svg.close();
+        svg.group("faint", |svg| svg.path("dashed", &format!("M{sx} {sy}L{ex} {ey}")));
     }
 }

@@ -2,14 +2,14 @@
 
 use glam::DVec2;
 
-use super::TIME;
+use super::{TIME, named_rows};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Entry, FOOT, LegendMark, MARGIN, Panel, triangle_right},
+    chart::{ChartText, Entry, FOOT, LegendMark, Panel, triangle_right},
     medium::Medium,
     svg::{Svg, coordinate, dots},
     trace,
-    width::{SIZE, distinct, width},
+    width::{SIZE, distinct},
 };
 
 /// Height of a row, and of the ends of a bar.
@@ -84,28 +84,26 @@ impl MemberTimes<'_> {
         let (mut svg, top) = heading.begin(medium, 24.0 + height + FOOT);
         let all: Vec<String> = members.iter().map(|member| member.name.clone()).collect();
         let shown = distinct(&all, SIZE, medium.name(NAME));
-        let left = MARGIN + 8.0 + shown.iter().map(|name| width(name, SIZE)).fold(width(names, SIZE), f64::max);
         let times = members.iter().flat_map(MemberDot::ends).chain(members.iter().map(|member| member.t));
         let across = Axis::over(&text.quantity, TIME, scale, times);
         // From 0 where all times are far from equal: the eye then compares lengths.
         let range = reached().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
         let across = if range.0 < 0.7 * range.1 { across.with_zero() } else { across };
         let rows = Axis::new("", "", Scale::Linear, (0.0, members.len() as f64));
-        let (corner, size) = (DVec2::new(left, top + 24.0), DVec2::new(svg.width() - left - MARGIN, height));
-        let panel = Panel { heading: "", corner, size, x: &across, y: &rows, labels_x: true };
-        panel.draw_x(&mut svg);
-        svg.text_unless_empty("note end", DVec2::new(left - 8.0, corner.y - 8.0), names);
-        svg.open("s0");
-        for (i, (member, name)) in members.iter().zip(&shown).enumerate() {
-            let y = corner.y + ROW * (i as f64 + 0.5);
-            svg.text_unless_empty("y tick end", DVec2::new(left - 8.0, y + 4.0), name);
-            let line = [DVec2::new(left, y), DVec2::new(panel.end().x, y)];
-            svg.path("grid", &trace::path(&line));
-            if member.is_drawable(scale) {
-                member.draw(&mut svg, &panel, y);
+        let panel = named_rows(&mut svg, [&across, &rows], (&shown, names), (top + 24.0, height), 0.0);
+        let DVec2 { x: left, y: top } = panel.corner;
+        svg.text_unless_empty("note end", DVec2::new(left - 8.0, top - 8.0), names);
+        svg.group("s0", |svg| {
+            for (i, (member, name)) in members.iter().zip(&shown).enumerate() {
+                let y = top + ROW * (i as f64 + 0.5);
+                svg.text_unless_empty("y tick end", DVec2::new(left - 8.0, y + 4.0), name);
+                let line = [DVec2::new(left, y), DVec2::new(panel.end().x, y)];
+                svg.path("grid", &trace::path(&line));
+                if member.is_drawable(scale) {
+                    member.draw(svg, &panel, y);
+                }
             }
-        }
-        svg.close();
+        });
         panel.draw_frame(&mut svg);
         svg.finish()
     }

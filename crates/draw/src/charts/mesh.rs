@@ -1,31 +1,24 @@
 //! Mesh quality of the members: how unequal the spacing of nodes is at the end, and how far lengths have drifted.
 
-use glam::DVec2;
-
 use super::{
-    PanelGrid,
+    GRID_HEIGHT, PanelGrid,
     bins::{Bins, guide},
+    some,
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel},
+    chart::{ChartText, Entry, LegendMark, MARGIN, Panel},
     empty::say,
     medium::Medium,
     svg::Svg,
-    width::{SIZE, shortened},
 };
 use curvelax_base::text::{count, significant};
 
-const HEIGHT: f64 = 200.0;
-const GAP: f64 = 14.0;
-
 /// Mesh quality of the members at their end.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshQuality<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
+    /// What is said of it.
+    pub text: ChartText,
     /// Longest over shortest edge, one number per member: a picture shows less than seven digits.
     pub mesh_ratio: &'a [f32],
     /// max |r_i − |e_i||/|e_i|, one number per member.
@@ -66,36 +59,24 @@ impl MeshMeasure {
     }
 
     fn sentence(&self) -> String {
-        let zeros = match self.zeros {
-            0 => String::new(),
-            zeros => format!("{} with {} 0 left out. ", count(zeros as u64, "member"), self.name),
-        };
-        let unknown = match self.unknown {
-            0 => String::new(),
-            unknown => format!("{} without {}.", count(unknown as u64, "member"), self.name),
-        };
-        (zeros + &unknown).trim().into()
+        let zeros = some(self.zeros, "member", &format!("with {} 0 left out.", self.name));
+        let unknown = some(self.unknown, "member", &format!("without {}.", self.name));
+        [zeros, unknown].join(" ").trim().into()
     }
 
-    /// Draws the panel from `corner`, `width` wide including its labels.
-    fn draw(&self, svg: &mut Svg, corner: DVec2, width: f64, bound: Option<f64>) {
+    /// Draws the panel `i`.
+    fn draw(&self, svg: &mut Svg, places: &PanelGrid, (i, top): (usize, f64), bound: Option<f64>) {
         let Some(bins) = &self.bins else {
-            let (corner, size) = (corner + DVec2::new(MARGIN, 0.0), DVec2::new(width - MARGIN, HEIGHT));
+            let nothing = Axis::counts("", 0);
+            let Panel { corner, size, .. } = places.panel(i, top, MARGIN, "", [&nothing; 2]);
             return say(svg, corner, size, &format!("No member has a {}.", self.name));
         };
         let (across, members) = (bins.axis(self.name, "", self.scale), Axis::counts("members", bins.most()));
-        let left = Panel::left(&members, HEIGHT);
-        let size = DVec2::new(width - left, HEIGHT);
-        let heading = shortened(&self.heading, SIZE, size.x);
-        let corner = corner + DVec2::new(left, 0.0);
-        let panel = Panel { heading: &heading, corner, size, x: &across, y: &members, labels_x: true };
-        panel.draw_x(svg);
-        panel.draw_y(svg);
+        let panel = places.panel(i, top, Panel::left(&members, GRID_HEIGHT), &self.heading, [&across, &members]);
+        panel.draw_axes(svg);
         bins.draw(svg, &panel);
         if let Some(bound) = bound.filter(|bound| across.holds(*bound)) {
-            svg.open("ink");
-            guide(svg, &panel, bound);
-            svg.close();
+            svg.group("ink", |svg| guide(svg, &panel, bound));
         }
         panel.draw_frame(svg);
     }
@@ -121,15 +102,14 @@ impl MeshQuality<'_> {
             }
             _ => String::new(),
         };
-        let sentences = vec![self.note.into(), verdict, ratio.sentence(), drift.sentence()];
+        let mut heading = self.text.heading([verdict, ratio.sentence(), drift.sentence()]);
         let label = |(bound, _)| format!("metric_drift {}, above which results are distrusted", significant(bound, 1));
         let shown = distrusted.filter(|(_, above)| *above > 0).map(label);
-        let legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
-        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, 0.0);
-        let (mut svg, top) = Heading { title: self.title, sentences, legend }.begin(medium, places.height(2));
-        let corner = |i: usize| DVec2::new(0.0, top + HEADING) + places.corner(i);
-        ratio.draw(&mut svg, corner(0), places.width, None);
-        drift.draw(&mut svg, corner(1), places.width, distrusted.map(|(bound, _)| bound));
+        heading.legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
+        let places = PanelGrid::new(medium, 0.0);
+        let (mut svg, top) = heading.begin(medium, places.height(2));
+        ratio.draw(&mut svg, &places, (0, top), None);
+        drift.draw(&mut svg, &places, (1, top), distrusted.map(|(bound, _)| bound));
         svg.finish()
     }
 }

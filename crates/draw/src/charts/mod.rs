@@ -30,23 +30,33 @@ pub use work::{WorkCurve, WorkDiagram, WorkPanels};
 
 pub use super::chart::{CellKey, ChartText, Crossed, EstimatedNumber};
 
+use curvelax_base::text::count;
 use glam::DVec2;
 
 use super::{
     axis::Axis,
-    chart::{MARGIN, Panel},
+    chart::{Colours, FOOT, HEADING, Heading, MARGIN, Panel},
     medium::Medium,
     svg::Svg,
     trace,
+    width::{SIZE, shortened, width},
 };
 
 /// The unit of all times.
 const TIME: &str = "length⁴";
 /// With more curves than this, bands would hide each other.
 const MAX_BANDS: usize = 4;
+/// Height of the panels of a [`PanelGrid`], and pixels between them.
+const GRID_HEIGHT: f64 = 200.0;
+const GRID_GAP: f64 = 14.0;
 
 /// The lower and upper bounds of a curve at each of its times.
 pub type Band = (Vec<f64>, Vec<f64>);
+
+/// `3 members REST`; nothing of none.
+fn some(number: usize, one: &str, rest: &str) -> String {
+    if number == 0 { String::new() } else { format!("{} {rest}", count(number as u64, one)) }
+}
 
 /// Whether the bands of curves are drawn, of which each may have one.
 fn shows_bands<'a>(bands: impl ExactSizeIterator<Item = &'a Option<Band>>) -> bool {
@@ -60,43 +70,75 @@ fn draw_band(svg: &mut Svg, band: Option<&Band>, line: impl Fn(&[f64]) -> Vec<DV
     }
 }
 
-/// The panel of a picture that has only one, `height` high below `top`, with `room` for a colour bar at its right.
-fn only_panel<'a>(svg: &Svg, [x, y]: [&'a Axis; 2], top: f64, height: f64, room: f64) -> Panel<'a> {
+/// A chart of one panel, `height` high, in which `layers` draws all but the axes.
+fn only_panel(
+    heading: &Heading,
+    medium: Medium,
+    colours: &Colours,
+    [x, y]: [&Axis; 2],
+    height: f64,
+    layers: impl FnOnce(&mut Svg, &Panel),
+) -> String {
+    let (mut svg, top) = heading.begin(medium, 8.0 + height + FOOT);
     let left = Panel::left(y, height);
-    let size = DVec2::new(svg.width() - left - MARGIN - room, height);
-    Panel { heading: "", corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true }
+    let size = DVec2::new(svg.width() - left - MARGIN - colours.room(height), height);
+    let panel = Panel { heading: String::new(), corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true };
+    panel.draw_axes(&mut svg);
+    layers(&mut svg, &panel);
+    colours.draw_bar(&mut svg, &panel);
+    svg.finish()
 }
 
-/// Panels of equal width side by side, in as many rows as they need.
+/// A panel, `height` high below `top`, of rows that have `names` at its left under `key`, with `room` at its right. Its
+/// horizontal axis is drawn.
+fn named_rows<'a>(
+    svg: &mut Svg,
+    [x, y]: [&'a Axis; 2],
+    (names, key): (&[String], &str),
+    (top, height): (f64, f64),
+    room: f64,
+) -> Panel<'a> {
+    let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(key, SIZE), f64::max);
+    let size = DVec2::new(svg.width() - left - MARGIN - room, height);
+    let panel = Panel { heading: String::new(), corner: DVec2::new(left, top), size, x, y, labels_x: true };
+    panel.draw_x(svg);
+    panel
+}
+
+/// Panels of equal size side by side, in as many rows as they need.
 struct PanelGrid {
     columns: usize,
     /// Width of a panel with its labels.
     width: f64,
-    /// Height of a row.
-    row: f64,
-    gap: f64,
 }
 
 impl PanelGrid {
-    /// Rows `row` high, with `gap` between panels and `room` for a colour bar at the right.
-    fn new(medium: Medium, row: f64, gap: f64, room: f64) -> PanelGrid {
+    /// Panels with `room` for a colour bar at the right.
+    fn new(medium: Medium, room: f64) -> PanelGrid {
         let columns = medium.columns();
         let width = match columns {
             1 => medium.width() - MARGIN - room,
-            _ => 0.5 * (medium.width() - MARGIN - gap - room),
+            _ => 0.5 * (medium.width() - MARGIN - GRID_GAP - room),
         };
-        PanelGrid { columns, width, row, gap }
+        PanelGrid { columns, width }
     }
 
     /// Height of all rows of so many panels.
     fn height(&self, panels: usize) -> f64 {
-        panels.div_ceil(self.columns) as f64 * self.row
+        panels.div_ceil(self.columns) as f64 * (HEADING + GRID_HEIGHT + FOOT)
     }
 
-    /// Where the panel `i` begins, from where the first does.
-    fn corner(&self, i: usize) -> DVec2 {
-        let [column, row] = [i % self.columns, i / self.columns].map(|place| place as f64);
-        DVec2::new(column * (self.width + self.gap), row * self.row)
+    /// Where the panel `i` and its labels begin, if the first row begins at `top`.
+    fn corner(&self, i: usize, top: f64) -> DVec2 {
+        let column = (i % self.columns) as f64;
+        DVec2::new(column * (self.width + GRID_GAP), top + HEADING + self.height(i / self.columns * self.columns))
+    }
+
+    /// The panel `i`, with `left` pixels for its labels, if the first row begins at `top`.
+    fn panel<'a>(&self, i: usize, top: f64, left: f64, heading: &str, [x, y]: [&'a Axis; 2]) -> Panel<'a> {
+        let size = DVec2::new(self.width - left, GRID_HEIGHT);
+        let corner = self.corner(i, top) + DVec2::new(left, 0.0);
+        Panel { heading: shortened(heading, SIZE, size.x), corner, size, x, y, labels_x: true }
     }
 }
 

@@ -2,14 +2,14 @@
 
 use super::{
     bins::{Bins, CellValues, guide},
-    only_panel,
+    only_panel, some,
 };
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, LegendMark},
+    chart::{ChartText, Colours, Entry, LegendMark},
     medium::Medium,
 };
-use curvelax_base::text::{count, significant};
+use curvelax_base::text::significant;
 
 const HEIGHT: f64 = 200.0;
 
@@ -33,10 +33,7 @@ impl FittedRates<'_> {
     pub fn draw(self, medium: Medium) -> String {
         let FittedRates { text, mut cells, relative, unit, without } = self;
         CellValues::sort(&mut cells);
-        let without = match without {
-            0 => String::new(),
-            without => format!("{} without a rate: fewer than 8 points in the window.", count(without, "member")),
-        };
+        let without = some(without as usize, "member", "without a rate: fewer than 8 points in the window.");
         if cells.iter().all(|cell| cell.numbers.is_empty()) {
             let reason = "No member was followed closely enough for a rate to be fitted.";
             return text.heading([without]).nothing(medium, reason);
@@ -60,18 +57,12 @@ impl FittedRates<'_> {
         let theory = shown.then(|| Entry::new("ink", LegendMark::Dashed, "linear theory"));
         let mut heading = text.heading([middle, without, colours.sentence(cells.len())]);
         heading.legend = named.chain(theory).collect();
-        let (mut svg, top) = heading.begin(medium, HEIGHT + FOOT + 8.0);
-        let panel = only_panel(&svg, [&across, &members], top, HEIGHT, colours.room(HEIGHT));
-        panel.draw_x(&mut svg);
-        panel.draw_y(&mut svg);
-        Bins::draw_all(&bins, &colours, &mut svg, &panel);
-        if shown {
-            svg.open("ink");
-            guide(&mut svg, &panel, 1.0);
-            svg.close();
-        }
-        panel.draw_frame(&mut svg);
-        colours.draw_bar(&mut svg, &panel);
-        svg.finish()
+        only_panel(&heading, medium, &colours, [&across, &members], HEIGHT, |svg, panel| {
+            Bins::draw_all(&bins, &colours, svg, panel);
+            if shown {
+                svg.group("ink", |svg| guide(svg, panel, 1.0));
+            }
+            panel.draw_frame(svg);
+        })
     }
 }

@@ -63,7 +63,7 @@ impl RelaxationTimes<'_> {
         let left = Panel::left(&counted, HISTOGRAM).max(Panel::left(&share, SHARE));
         let width = svg.width() - MARGIN - left - colours.room(HISTOGRAM);
         let above = Panel {
-            heading: "",
+            heading: String::new(),
             corner: DVec2::new(left, top + 8.0),
             size: DVec2::new(width, HISTOGRAM),
             x: &across,
@@ -75,38 +75,25 @@ impl RelaxationTimes<'_> {
             size: DVec2::new(width, SHARE),
             y: &share,
             labels_x: true,
-            ..above
+            ..above.clone()
         };
-        for panel in [&above, &below] {
-            panel.draw_x(&mut svg);
-            panel.draw_y(&mut svg);
-        }
+        [&above, &below].into_iter().for_each(|panel| panel.draw_axes(&mut svg));
         // Behind the bars, whose heights it would hide.
         let shaded = median.and_then(|median| median.interval);
         for panel in [&above, &below] {
             let Some(Interval { lower, upper, .. }) = shaded else { continue };
             let (start, end) = panel.x.range();
-            svg.open("ink");
-            interval(&mut svg, panel, (lower.unwrap_or(start), upper.unwrap_or(end)));
-            svg.close();
+            svg.group("ink", |svg| interval(svg, panel, (lower.unwrap_or(start), upper.unwrap_or(end))));
         }
         Bins::draw_all(&bins, &colours, &mut svg, &above);
         let least = trace::tolerance(if cells.len() > 1 { 2 * colours.shown.len() } else { 1 }, SHARE);
-        for (i, class) in &colours.shown {
-            svg.open(class);
-            svg.path("series", &trace::path(&steps(&cells[*i], &below, least)));
-            svg.close();
-        }
+        colours.each(&mut svg, |svg, _, i| svg.path("series", &trace::path(&steps(&cells[i], &below, least))));
         colours.draw_bar(&mut svg, &above);
         if let Some(median) = median {
-            svg.open("ink");
-            for panel in [&above, &below].into_iter().filter(|panel| panel.x.holds(median.value)) {
-                guide(&mut svg, panel, median.value);
-            }
-            svg.close();
+            let held = [&above, &below].into_iter().filter(|panel| panel.x.holds(median.value));
+            svg.group("ink", |svg| held.for_each(|panel| guide(svg, panel, median.value)));
         }
-        above.draw_frame(&mut svg);
-        below.draw_frame(&mut svg);
+        [above, below].into_iter().for_each(|panel| panel.draw_frame(&mut svg));
         svg.finish()
     }
 }

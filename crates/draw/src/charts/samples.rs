@@ -253,7 +253,8 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
             [mesh_ratio, metric_drift].map(|values| values.iter().map(|v| *v as f32).collect::<Vec<_>>());
         let [mesh_ratio, metric_drift] = [&mesh_ratio[..], &metric_drift[..]];
         let distrusted = Some((0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count() as u64));
-        MeshQuality { title: "Mesh quality at the end", note: NOTE, mesh_ratio, metric_drift, distrusted }.draw(medium)
+        let text = text("Mesh quality at the end", "", CellKey::default());
+        MeshQuality { text, mesh_ratio, metric_drift, distrusted }.draw(medium)
     };
     let ratios = |count: usize| -> Vec<f64> { times(count, 0.05, 0.4).iter().map(|t| 1.0 + t).collect() };
     add("mesh", mesh(&ratios(512), &times(512, 1e-3, 2.2)));
@@ -354,9 +355,8 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
     add("members-none", few(vec![]));
 
     let work = |rows: Vec<WorkPanels>| {
-        let title = "What an error of the relaxation time costs";
-        WorkDiagram { title, note: NOTE, costs: [("solves per member", ""), ("time per member", "ms")], rows }
-            .draw(medium)
+        let text = self::text("What an error of the relaxation time costs", "", CellKey::default());
+        WorkDiagram { text, costs: [("solves per member", ""), ("time per member", "ms")], rows }.draw(medium)
     };
     let way = |order: i32| {
         let point = |i: i32| (10_f64.powi(-i * order), [10.0 * 4_f64.powi(i), 0.1 * 4_f64.powi(i)]);

@@ -2,20 +2,14 @@
 //!
 //! The pointer on a dot shows its member and its numbers.
 
-use glam::DVec2;
-
-use super::{PanelGrid, TIME};
+use super::{GRID_HEIGHT, PanelGrid, TIME, some};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, HEADING, LegendMark, Panel, triangle_up},
+    chart::{ChartText, Colours, Entry, LegendMark, Panel, triangle_up},
     medium::Medium,
     svg::{Svg, dots},
-    width::{SIZE, shortened},
 };
-use curvelax_base::text::{count, significant};
-
-const HEIGHT: f64 = 200.0;
-const GAP: f64 = 14.0;
+use curvelax_base::text::significant;
 
 /// A time against features.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -83,40 +77,30 @@ impl Scatter<'_> {
         let colours = Colours::of(self.cells, &self.text.key);
         heading.sentences.push(colours.sentence(self.cells));
         let hidden = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| !point.is_drawable()).count();
-        if hidden > 0 {
-            heading.sentences.push(format!("{} out of range.", count(hidden as u64, "dot")));
-        }
-        let places = PanelGrid::new(medium, HEADING + HEIGHT + FOOT, GAP, colours.room(HEIGHT));
+        heading.sentences.push(some(hidden, "dot", "out of range."));
+        let places = PanelGrid::new(medium, colours.room(GRID_HEIGHT));
         heading.legend = self.legend(&colours);
         let (mut svg, top) = heading.begin(medium, places.height(self.panels.len()));
         let times = self.panels.iter().flat_map(|panel| &panel.points).filter(|point| point.is_drawable());
         let scale = Scale::of(times.clone().map(|point| point.t));
         let time = Axis::over(&self.text.quantity, TIME, scale, times.map(|point| point.t));
-        let left = Panel::left(&time, HEIGHT);
+        let left = Panel::left(&time, GRID_HEIGHT);
         for (i, of) in self.panels.iter().enumerate() {
             let known = of.points.iter().filter(|point| point.is_drawable());
             // Where times are over several magnitudes, features may be, too.
             let own = if scale == Scale::Log { Scale::of(known.clone().map(|point| point.x)) } else { Scale::Linear };
             let axis = Axis::over(&of.feature, "", own, known.map(|point| point.x));
-            let corner = DVec2::new(left, top + HEADING) + places.corner(i);
-            let size = DVec2::new(places.width - left, HEIGHT);
-            let heading = shortened(&of.heading, SIZE, size.x);
-            let panel = Panel { heading: &heading, corner, size, x: &axis, y: &time, labels_x: true };
-            panel.draw_x(&mut svg);
-            panel.draw_y(&mut svg);
-            for (cell, class) in &colours.shown {
-                svg.open(class);
+            let panel = places.panel(i, top, left, &of.heading, [&axis, &time]);
+            panel.draw_axes(&mut svg);
+            colours.each(&mut svg, |svg, _, cell| {
                 for (class, happened) in [("points", true), ("hollow", false)] {
-                    let is_one = |point: &&ScatterPoint| point.cell == *cell && point.happened == happened;
+                    let is_one = |point: &&ScatterPoint| point.cell == cell && point.happened == happened;
                     let mut own = of.points.iter().filter(is_one).filter(|point| point.is_drawable()).peekable();
                     if own.peek().is_some() {
-                        svg.open(class);
-                        own.for_each(|point| point.draw(&mut svg, &panel));
-                        svg.close();
+                        svg.group(class, |svg| own.for_each(|point| point.draw(svg, &panel)));
                     }
                 }
-                svg.close();
-            }
+            });
             panel.draw_frame(&mut svg);
             if i + 1 == self.panels.len().min(places.columns) {
                 colours.draw_bar(&mut svg, &panel);

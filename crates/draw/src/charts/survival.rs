@@ -7,7 +7,7 @@ use glam::DVec2;
 use super::{Band, TIME, draw_band, only_panel, shows_bands};
 use crate::{
     axis::{Axis, Scale},
-    chart::{ChartText, Colours, Entry, FOOT, LegendMark, Panel, stroke},
+    chart::{ChartText, Colours, Entry, LegendMark, Panel, stroke},
     medium::Medium,
     trace,
 };
@@ -138,28 +138,22 @@ impl Survival<'_> {
         }
         let (bands, censored) = (self.has_bands(), self.has_strokes());
         heading.legend = self.legend(&colours, bands, censored);
-        let (mut svg, top) = heading.begin(medium, 8.0 + HEIGHT + FOOT);
-
         let times = || curves.iter().flat_map(SurvivalCurve::times);
         let scale = Scale::of(curves.iter().flat_map(SurvivalCurve::quartiles));
         let scale = if times().any(|t| scale.holds(t)) { scale } else { Scale::Linear };
         let across = Axis::over(&text.quantity, TIME, scale, times()).with_zero();
         let upwards = Axis::new(self.share, "", Scale::Linear, (0.0, 1.02));
-        let panel = only_panel(&svg, [&across, &upwards], top, HEIGHT, colours.room(HEIGHT));
-        panel.draw(&mut svg);
-        let lines = colours.shown.len() * if bands { 3 } else { 1 };
-        let least = trace::tolerance(lines, HEIGHT);
-        let stroke_gap = (colours.shown.len() as f64 * panel.size.x / MAX_STROKES).max(STROKE_GAP);
-        for (i, class) in &colours.shown {
-            let curve = &curves[*i];
-            svg.open(class);
-            draw_band(&mut svg, curve.band.as_ref().filter(|_| bands), |shares| curve.line(shares, &panel, least));
-            svg.path("series", &trace::path(&curve.line(&curve.survival, &panel, least)));
-            svg.path("thin", &curve.strokes(&panel, stroke_gap));
-            svg.close();
-        }
-        colours.draw_bar(&mut svg, &panel);
-        svg.finish()
+        only_panel(&heading, medium, &colours, [&across, &upwards], HEIGHT, |svg, panel| {
+            panel.draw_frame(svg);
+            let least = trace::tolerance(colours.shown.len() * if bands { 3 } else { 1 }, HEIGHT);
+            let stroke_gap = (colours.shown.len() as f64 * panel.size.x / MAX_STROKES).max(STROKE_GAP);
+            colours.each(svg, |svg, _, i| {
+                let curve = &curves[i];
+                draw_band(svg, curve.band.as_ref().filter(|_| bands), |shares| curve.line(shares, panel, least));
+                svg.path("series", &trace::path(&curve.line(&curve.survival, panel, least)));
+                svg.path("thin", &curve.strokes(panel, stroke_gap));
+            });
+        })
     }
 
     /// Whether bands are drawn.

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use crate::{
     axis::{Axis, Scale},
-    chart::{Entry, FOOT, HEADING, Heading, LegendMark, MARGIN, Panel, draw_marker},
+    chart::{ChartText, Entry, FOOT, HEADING, LegendMark, MARGIN, Panel, draw_marker},
     medium::Medium,
     trace,
 };
@@ -15,10 +15,8 @@ const GAP: f64 = 24.0;
 /// Errors and costs of several methods.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WorkDiagram<'a> {
-    /// First line.
-    pub title: &'a str,
-    /// A sentence below it, or nothing.
-    pub note: &'a str,
+    /// What is said of it.
+    pub text: ChartText,
     /// Names of the costs, one for each column of panels, with their units.
     pub costs: [(&'a str, &'a str); 2],
     /// The rows of panels.
@@ -46,7 +44,7 @@ pub struct WorkCurve {
 impl WorkDiagram<'_> {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let WorkDiagram { title, note, costs, rows } = self;
+        let WorkDiagram { text, costs, rows } = self;
         let pairs = |curve: &WorkCurve, column: usize| -> Vec<(f64, f64)> {
             curve.points.iter().map(|(error, costs)| (costs[column], *error)).collect()
         };
@@ -54,7 +52,7 @@ impl WorkDiagram<'_> {
             let pairs = rows.iter().flat_map(|row| &row.curves).flat_map(move |curve| pairs(curve, column));
             pairs.filter(|(cost, error)| Scale::Log.holds(*cost) && Scale::Log.holds(*error))
         };
-        let mut heading = Heading { title, sentences: vec![(*note).into()], legend: Vec::new() };
+        let mut heading = text.heading([]);
         if all(0).next().is_none() {
             return heading.nothing(medium, "No run gave an error.");
         }
@@ -75,7 +73,7 @@ impl WorkDiagram<'_> {
         for (i, row) in rows.iter().enumerate() {
             for (column, x) in across.iter().enumerate() {
                 let corner = DVec2::new(left + column as f64 * (size.x + GAP), top + HEADING + i as f64 * row_height);
-                let panel = Panel { heading: &row.label, corner, size, x, y: &errors, labels_x: true };
+                let panel = Panel { heading: row.label.clone(), corner, size, x, y: &errors, labels_x: true };
                 panel.draw_x(&mut svg);
                 if column == 0 {
                     panel.draw_y(&mut svg);
@@ -83,10 +81,10 @@ impl WorkDiagram<'_> {
                 panel.draw_frame(&mut svg);
                 for (rank, curve) in row.curves.iter().enumerate() {
                     let places = panel.points(pairs(curve, column));
-                    svg.open(&format!("s{rank}"));
-                    svg.path("thin", &trace::path(&places));
-                    places.iter().for_each(|at| draw_marker(&mut svg, rank, *at));
-                    svg.close();
+                    svg.group(&format!("s{rank}"), |svg| {
+                        svg.path("thin", &trace::path(&places));
+                        places.iter().for_each(|at| draw_marker(svg, rank, *at));
+                    });
                 }
             }
         }

@@ -8,10 +8,7 @@ use curvelax_base::{
     error::{Error, Result, echo, shortened},
     text::{count, number},
 };
-use curvelax_curve::{
-    Sampling, Shape,
-    outlines::{Labelled, SavedOutline},
-};
+use curvelax_curve::{Sampling, Shape, outlines::Labelled};
 
 /// The outlines of the shapes of a spec that are read from files.
 #[derive(Clone, Default)]
@@ -64,19 +61,16 @@ impl Outlines {
         self.sets.iter().flat_map(|(_, set)| &set.all)
     }
 
-    /// The text of each shape with its outlines in parts.
-    pub fn saved(&self) -> Vec<(String, Vec<SavedOutline<'_>>)> {
-        self.sets
-            .iter()
-            .map(|(shape, set)| (shape.to_string(), set.all.iter().map(SavedOutline::new).collect()))
-            .collect()
+    /// The text of each shape with its outlines.
+    pub fn saved(&self) -> Vec<(String, &[Labelled])> {
+        self.sets.iter().map(|(shape, set)| (shape.to_string(), &set.all[..])).collect()
     }
 
-    /// The outlines of which these are the parts; `None` if there are none.
-    pub fn restored(saved: Vec<(String, Vec<SavedOutline<'_>>)>) -> Option<Outlines> {
-        let set = |(shape, parts): (String, Vec<SavedOutline<'_>>)| {
-            let all: Option<Vec<Labelled>> = parts.into_iter().map(SavedOutline::restored).collect();
-            Some((shape.parse().ok()?, OutlineSet::new(all?).ok()?.into()))
+    /// Those that were saved as this; `None` if they cannot be outlines.
+    pub fn restored(saved: Vec<(String, Vec<Labelled>)>) -> Option<Outlines> {
+        let set = |(shape, all): (String, Vec<Labelled>)| {
+            let all = Some(all).filter(|all| all.iter().all(|one| one.outline.is_possible()))?;
+            Some((shape.parse().ok()?, OutlineSet::new(all).ok()?.into()))
         };
         Some(Outlines { sets: saved.into_iter().map(set).collect::<Option<_>>()?, has_formulas: false })
     }

@@ -1,6 +1,10 @@
 //! The checkpoint in a folder, the one before it, and the outlines that belong to both.
 
-use std::{fs, io::Write};
+use std::{
+    fs,
+    io::{self, Write},
+    path::Path,
+};
 
 use super::OutputFolder;
 use crate::{
@@ -14,11 +18,7 @@ impl OutputFolder {
     pub fn keep_state(&self, bytes: &[u8]) -> Result<()> {
         self.check_claim()?;
         let [state, old, part] = [STATE, STATE_OLD, STATE_PART].map(|name| self.place(name));
-        let written = create(part.at()).and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        });
-        let renamed = written.and_then(|()| {
+        let renamed = write(part.at(), bytes).and_then(|()| {
             if state.at().exists() {
                 fs::rename(state.at(), old.at())?;
             }
@@ -35,28 +35,26 @@ impl OutputFolder {
     pub fn keep_outlines(&self, bytes: &[u8]) -> Result<()> {
         self.check_claim()?;
         let outlines = self.place(OUTLINES);
-        let written = create(outlines.at()).and_then(|mut file| {
-            file.write_all(bytes)?;
-            file.sync_all()
-        });
-        written.map_err(outlines.io("cannot write"))
+        write(outlines.at(), bytes).map_err(outlines.io("cannot write"))
     }
 
     /// Removes a damaged last checkpoint, lest it become the previous one.
     pub fn forget_last_state(&self) -> Result<()> {
-        let state = self.place(STATE);
-        remove(state.at()).map_err(state.io("cannot remove"))
+        self.remove_own(STATE)
     }
 
     /// Removes the checkpoints, the older one first: alone it would resume with files that already have their final
     /// names. The outlines are needed until there is none.
     pub fn forget_states(&self) -> Result<()> {
-        for name in [STATE_PART, STATE_OLD, STATE, OUTLINES] {
-            let place = self.place(name);
-            remove(place.at()).map_err(place.io("cannot remove"))?;
-        }
-        Ok(())
+        [STATE_PART, STATE_OLD, STATE, OUTLINES].into_iter().try_for_each(|name| self.remove_own(name))
     }
+}
+
+/// Writes a file anew, and returns once it is on disk.
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
 }
 
 #[cfg(test)]

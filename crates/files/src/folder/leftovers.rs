@@ -15,7 +15,7 @@ impl OutputFolder {
     pub(super) fn check_names(&mut self) -> Result<()> {
         let in_the_way = |place: &Place, what: &str| {
             let problem = format!("{} is {what}", place.shown().display());
-            Err(Error::value("out", self.path.display(), &problem, "move it away, or use another folder"))
+            Err(Error::value("out", self.path().display(), &problem, "move it away, or use another folder"))
         };
         let plots = self.place(PLOTS);
         let needed = self.names.iter().any(|name| Path::new(name).starts_with(PLOTS));
@@ -56,7 +56,7 @@ impl OutputFolder {
 
     /// Removes everything that an interrupted run left, except `names`.
     pub fn keep_only(&self, names: &[&str]) -> Result<()> {
-        self.remove_parts(names).map_err(Error::io("cannot remove what a run left in", &self.path))
+        self.remove_parts(names).map_err(self.place.io("cannot remove what a run left in"))
     }
 
     pub(super) fn remove_own(&self, name: &str) -> Result<()> {

@@ -34,13 +34,12 @@ const MAX_NAME: usize = 96;
 /// If it is empty when dropped, the folders created for this run are removed again.
 #[derive(Debug)]
 pub struct OutputFolder {
-    path: PathBuf,
     /// The folders created for this run, outermost first.
     made: Vec<PathBuf>,
     new_plots: bool,
     /// None until it is held.
     claim: Option<Claim>,
-    /// Where names in it are looked up.
+    /// Where it was found, and where names in it are looked up.
     place: Place,
     /// The files that may be written.
     names: Vec<String>,
@@ -115,13 +114,12 @@ impl OutputFolder {
     }
 
     fn of(path: &Path, names: Vec<String>) -> OutputFolder {
-        let place = Place::named(path);
-        OutputFolder { path: path.into(), made: Vec::new(), new_plots: false, claim: None, place, names }
+        OutputFolder { made: Vec::new(), new_plots: false, claim: None, place: Place::named(path), names }
     }
 
     /// Claims the folder; returns whether this run holds it.
     fn claim(&mut self) -> io::Result<bool> {
-        self.claim = Claim::take(&self.path)?;
+        self.claim = Claim::take(self.path())?;
         if let Some(claim) = &self.claim {
             self.place = claim.place().clone();
         }
@@ -131,7 +129,6 @@ impl OutputFolder {
     /// Uses the absolute path from now on: outlines of a run are named relative to the directory in which it began,
     /// which may be a different one.
     pub fn make_absolute(&mut self) -> Result<()> {
-        self.path = std::path::absolute(&self.path).map_err(Error::io("cannot find", &self.path))?;
         if let Some(claim) = &mut self.claim {
             claim.make_absolute()?;
             self.place = claim.place().clone();
@@ -167,7 +164,7 @@ impl OutputFolder {
 
     /// Where it was found.
     pub fn path(&self) -> &Path {
-        &self.path
+        self.place.shown()
     }
 
     /// The place `name` in it.

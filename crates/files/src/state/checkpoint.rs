@@ -142,7 +142,7 @@ fn here() -> Result<String> {
 /// The bytes of a checkpoint; `resident` is used instead of that in `progress`.
 pub fn to_bytes(head: &CheckpointHead, progress: &RunProgress, resident: &BTreeMap<u64, Paused>) -> Result<Vec<u8>> {
     let body = (head, progress.next, &progress.early, resident);
-    sealed_body(*LAYOUT, &body).map_err(|e| Error::Failed(format!("cannot write {STATE}: {e}")))
+    sealed_body(*LAYOUT, STATE, &body)
 }
 
 /// Reads a checkpoint from bytes.
@@ -345,7 +345,7 @@ mod tests {
         let folder = OutputFolder::open(home.path(), true).unwrap();
         let (head, progress) = state();
         let body = (&head, progress.next, &progress.early, progress.resident.as_ref().unwrap());
-        folder.keep_state(&sealed_body(*LAYOUT ^ 1, &body).unwrap()).unwrap();
+        folder.keep_state(&sealed_body(*LAYOUT ^ 1, STATE, &body).unwrap()).unwrap();
         let Err(error) = find(&folder) else { panic!("it is read") };
         let (path, own, other) = (home.path().display(), *LAYOUT, *LAYOUT ^ 1);
         let expected = format!(

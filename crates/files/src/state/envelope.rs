@@ -13,7 +13,7 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use crate::disk;
-use curvelax_base::{input, text};
+use curvelax_base::{error::Error, input, text};
 
 const MAGIC: [u8; 16] = *b"curvelax state\r\n";
 /// Version of the format: of the envelope, and of numbers whose order no layout shows.
@@ -33,15 +33,20 @@ pub enum Fault {
     Damaged(String),
 }
 
-/// A file of this version of the program with this body, whose layout has this fingerprint.
-pub fn sealed_body(layout: u32, body: &impl Serialize) -> postcard::Result<Vec<u8>> {
+/// The file called `name` of this version of the program with this body, whose layout has this fingerprint.
+///
+/// # Errors
+/// [`Error::Failed`] for a body that cannot be written.
+pub fn sealed_body(layout: u32, name: &str, body: &impl Serialize) -> Result<Vec<u8>, Error> {
     let body = (curvelax_base::VERSION, body);
-    let size = postcard::experimental::serialized_size(&body)?;
-    sealed(layout, |mut bytes| {
-        // A checkpoint may be large: reserve exactly as much as it needs.
-        bytes.reserve_exact(size + AFTER);
-        postcard::to_extend(&body, bytes)
-    })
+    let sealed = postcard::experimental::serialized_size(&body).and_then(|size| {
+        sealed(layout, |mut bytes| {
+            // A checkpoint may be large: reserve exactly as much as it needs.
+            bytes.reserve_exact(size + AFTER);
+            postcard::to_extend(&body, bytes)
+        })
+    });
+    sealed.map_err(|e| Error::Failed(format!("cannot write {name}: {e}")))
 }
 
 /// A file with the body that `write` appends to its beginning.
@@ -165,7 +170,7 @@ mod tests {
     const LAYOUT: u32 = 0x1234_5678;
 
     fn sample() -> Vec<u8> {
-        sealed_body(LAYOUT, &(7_u64, "text")).unwrap()
+        sealed_body(LAYOUT, "sample", &(7_u64, "text")).unwrap()
     }
 
     fn read(bytes: &[u8]) -> Result<(u64, &str), Fault> {

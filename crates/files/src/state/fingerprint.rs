@@ -16,6 +16,7 @@ use serde::{
         Deserializer, EnumAccess, Error as _, IntoDeserializer, MapAccess, SeqAccess, VariantAccess, Visitor,
         value::{Error, U32Deserializer},
     },
+    forward_to_deserialize_any,
 };
 
 /// A number that differs if the layout of `T` differs.
@@ -264,13 +265,7 @@ impl<'de> Deserializer<'de> for &mut Tracer {
         Err(Error::custom("the type asks what comes next, which postcard does not write"))
     }
 
-    fn deserialize_identifier<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        self.deserialize_any(visitor)
-    }
-
-    fn deserialize_ignored_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, Error> {
-        self.deserialize_any(visitor)
-    }
+    forward_to_deserialize_any! { identifier ignored_any }
 
     fn is_human_readable(&self) -> bool {
         false

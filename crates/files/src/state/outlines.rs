@@ -10,12 +10,12 @@ use super::{
     fingerprint::fingerprint,
 };
 use crate::{folder::OutputFolder, names::OUTLINES};
-use curvelax_base::error::{Error, Result};
-use curvelax_curve::outlines::SavedOutline;
+use curvelax_base::error::Result;
+use curvelax_curve::outlines::Labelled;
 use curvelax_ensemble::Outlines;
 
 /// The content of the file: the text of each shape, and its outlines.
-type Content<'a> = Vec<(String, Vec<SavedOutline<'a>>)>;
+type Content = Vec<(String, Vec<Labelled>)>;
 
 /// The fingerprint of its layout.
 static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Content>);
@@ -25,8 +25,7 @@ pub fn save(folder: &OutputFolder, outlines: &Outlines) -> Result<()> {
     if outlines.is_empty() {
         return Ok(());
     }
-    let bytes = sealed_body(*LAYOUT, &outlines.saved());
-    folder.keep_outlines(&bytes.map_err(|e| Error::Failed(format!("cannot write {OUTLINES}: {e}")))?)
+    folder.keep_outlines(&sealed_body(*LAYOUT, OUTLINES, &outlines.saved())?)
 }
 
 /// The outlines that were saved in `folder` by the run with this origin; none if it has none.

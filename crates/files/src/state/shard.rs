@@ -78,8 +78,7 @@ pub enum Found {
 
 /// The bytes of the file.
 pub fn to_bytes(head: &CheckpointHead, points: usize, warnings: &[String]) -> Result<Vec<u8>> {
-    let bytes = sealed_body(*LAYOUT, &(head, points, warnings));
-    bytes.map_err(|e| Error::Failed(format!("cannot write {SHARD}: {e}")))
+    sealed_body(*LAYOUT, SHARD, &(head, points, warnings))
 }
 
 /// Reads the file from bytes.

@@ -22,12 +22,10 @@ pub(super) const FIELDS: [(&str, &str, &str); 4] = [
 
 /// All arrays of a store.
 pub(super) struct Arrays {
-    pub(super) member: Array,
-    pub(super) time: Array,
-    pub(super) node: Array,
-    pub(super) cell: Array,
-    pub(super) fields: [Array; FIELDS.len()],
-    pub(super) status: Array,
+    /// Those that are known in advance: of members, times, nodes and cells.
+    pub(super) known: [Array; 4],
+    /// Those that grow: the [fields](FIELDS), and the [status](STATUS) of each member.
+    pub(super) growing: Vec<Array>,
 }
 
 /// The arrays for the members of `spec`, with chunks of at most `bytes`.
@@ -35,7 +33,7 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
     let members = ("member", spec.member_count());
     let (instants, nodes) = (("time", times.len() as u64), ("node", points as u64));
     let vector = |name, kind, along, attributes| Array::new(name, kind, &[along], attributes, bytes);
-    let of_member = |name: &str| json!({ "long_name": name });
+    let named = |name: &str| json!({ "long_name": name });
     let flags = json!({
         "long_name": "how the member ended",
         "flag_values": Status::ALL.map(|status| status as u32),
@@ -43,17 +41,17 @@ pub(super) fn arrays(spec: &Spec, points: usize, times: &[f64], bytes: usize) ->
     });
     let unit = |own: &str| spec.units.as_ref().map_or(own.to_owned(), |units| units.attribute(own));
     let time = json!({ "long_name": "time", "units": unit("length^4") });
-    Arrays {
-        member: vector("member", DataType::Int64, members, of_member("index of the member")),
-        time: vector("time", DataType::Float64, instants, time),
-        node: vector("node", DataType::Int64, nodes, json!({ "long_name": "number of the node along the curve" })),
-        cell: vector("cell", DataType::Int64, members, of_member("index of the cell of the sweep")),
-        fields: FIELDS.map(|(name, units, what)| {
-            let attributes = json!({ "long_name": what, "units": unit(units), "coordinates": "cell status" });
-            Array::new(name, DataType::Float64, &[members, instants, nodes], attributes, bytes)
-        }),
-        status: vector(STATUS, DataType::Int8, members, flags),
-    }
+    let fields = FIELDS.map(|(name, units, what)| {
+        let attributes = json!({ "long_name": what, "units": unit(units), "coordinates": "cell status" });
+        Array::new(name, DataType::Float64, &[members, instants, nodes], attributes, bytes)
+    });
+    let known = [
+        vector("member", DataType::Int64, members, named("index of the member")),
+        vector("time", DataType::Float64, instants, time),
+        vector("node", DataType::Int64, nodes, named("number of the node along the curve")),
+        vector("cell", DataType::Int64, members, named("index of the cell of the sweep")),
+    ];
+    Arrays { known, growing: fields.into_iter().chain([vector(STATUS, DataType::Int8, members, flags)]).collect() }
 }
 
 /// Bytes of the chunks that are being filled while a store of `spec` with `points` nodes grows, 0 without one.
@@ -61,7 +59,8 @@ pub fn bytes_held(spec: &Spec, points: usize) -> u64 {
     if spec.store != Store::Zarr || spec.snapshots.is_empty() {
         return 0;
     }
-    arrays(spec, points, &times(spec), CHUNK_BYTES).fields.iter().map(|array| array.chunk_bytes as u64).sum()
+    let growing = arrays(spec, points, &times(spec), CHUNK_BYTES).growing;
+    growing.iter().take(FIELDS.len()).map(|array| array.chunk_bytes as u64).sum()
 }
 
 /// The attributes of all arrays together.
@@ -79,9 +78,9 @@ pub(super) fn of_group(spec: &Spec) -> Result<Value> {
 /// # Errors
 /// [`Error::Failed`](curvelax_base::error::Error::Failed) if the spec cannot be written.
 pub fn attributes(spec: &Spec, points: usize) -> Result<Vec<(&'static str, Value)>> {
-    let Arrays { member, time, node, cell, fields, status } = arrays(spec, points, &times(spec), 0);
-    let all = [member, time, node, cell, status].into_iter().chain(fields);
-    let of_arrays = all.map(|mut array| Ok((array.name, array.metadata["attributes"].take())));
+    let Arrays { known, growing } = arrays(spec, points, &times(spec), 0);
+    let of_arrays =
+        known.into_iter().chain(growing).map(|mut array| Ok((array.name, array.metadata["attributes"].take())));
     [of_group(spec).map(|own| ("", own))].into_iter().chain(of_arrays).collect()
 }
 

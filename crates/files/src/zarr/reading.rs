@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::{
     array::{Array, ArrayMark},
     chunks::{CHUNK_BYTES, key},
-    layout::{Arrays, arrays, times},
+    layout::{arrays, times},
     mark::StoreMark,
 };
 use curvelax_base::{
@@ -40,9 +40,7 @@ impl StoredMembers {
     /// # Errors
     /// [`Error::Request`] if `mark` is not that of such a store.
     pub fn open(path: &Path, spec: &Spec, points: usize, mark: &StoreMark) -> Result<StoredMembers> {
-        let arrays = arrays(spec, points, &times(spec), CHUNK_BYTES);
-        let Arrays { fields, status, .. } = arrays;
-        let own: Vec<Array> = fields.into_iter().chain([status]).collect();
+        let own = arrays(spec, points, &times(spec), CHUNK_BYTES).growing;
         let fits = |(array, mark): (&Array, &ArrayMark)| {
             (array.name, &array.mark.grid) == (mark.name.as_str(), &mark.grid)
                 && mark.written == mark.grid.iter().product::<u64>()

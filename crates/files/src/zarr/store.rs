@@ -5,7 +5,7 @@ use serde_json::{Map, Value, json};
 use super::{
     array::Array,
     chunks::CHUNK_BYTES,
-    layout::{Arrays, arrays, nearest, of_group, times},
+    layout::{Arrays, FIELDS, arrays, nearest, of_group, times},
     mark::StoreMark,
     reading::StoredMembers,
 };
@@ -19,8 +19,8 @@ pub struct SnapshotStore {
     folder: PartFolder,
     times: Vec<f64>,
     points: usize,
-    fields: Vec<Array>,
-    status: Array,
+    /// The fields, and the status of the members.
+    growing: Vec<Array>,
     /// Times of the next member that are written.
     filled: usize,
 }
@@ -38,8 +38,8 @@ impl SnapshotStore {
         times: Vec<f64>,
         bytes: usize,
     ) -> Result<SnapshotStore> {
-        let Arrays { mut member, mut time, mut node, mut cell, fields, status } = arrays(spec, points, &times, bytes);
-        let all = fields.iter().chain([&member, &time, &node, &cell, &status]);
+        let Arrays { known, growing } = arrays(spec, points, &times, bytes);
+        let all = growing.iter().chain(&known);
         let consolidated: Map<String, Value> = all.clone().map(|a| (a.name.into(), a.metadata.clone())).collect();
         let group = json!({
             "zarr_format": 3,
@@ -52,13 +52,14 @@ impl SnapshotStore {
             folder.make(array.name)?;
             folder.write(&format!("{}/zarr.json", array.name), &pretty(&array.metadata)?)?;
         }
+        let [mut member, mut time, mut node, mut cell] = known;
         for index in spec.members() {
             member.push(&folder, &(index as i64).to_le_bytes())?;
             cell.push(&folder, &((index / spec.members_per_cell()) as i64).to_le_bytes())?;
         }
         times.iter().try_for_each(|t| time.push(&folder, &t.to_le_bytes()))?;
         (1..=points as i64).try_for_each(|i| node.push(&folder, &i.to_le_bytes()))?;
-        Ok(SnapshotStore { folder, times, points, fields: fields.into(), status, filled: 0 })
+        Ok(SnapshotStore { folder, times, points, growing, filled: 0 })
     }
 
     /// Adds a snapshot of the next member; they come in time order.
@@ -70,7 +71,7 @@ impl SnapshotStore {
         }
         self.skip_to(place)?;
         let Snapshot { x, y, k, r, .. } = snapshot;
-        for (array, values) in self.fields.iter_mut().zip([x, y, k, r]) {
+        for (array, values) in self.growing.iter_mut().zip([x, y, k, r]) {
             // NaN for unknown, as empty fields in tables.
             let known = |value: f64| if value.is_finite() { value } else { f64::NAN };
             let value = |i: usize| values.get(i).map_or(f64::NAN, |value| known(*value));
@@ -85,14 +86,14 @@ impl SnapshotStore {
     pub fn member(&mut self, status: Status) -> Result<()> {
         self.skip_to(self.times.len())?;
         self.filled = 0;
-        self.status.push(&self.folder, &[status as u8])
+        self.growing[FIELDS.len()].push(&self.folder, &[status as u8])
     }
 
     /// Leaves the times before the one at `place` unknown.
     fn skip_to(&mut self, place: usize) -> Result<()> {
         if self.filled < place {
             let unknown: Vec<u8> = f64::NAN.to_le_bytes().repeat(self.points);
-            for array in &mut self.fields {
+            for array in self.growing.iter_mut().take(FIELDS.len()) {
                 (self.filled..place).try_for_each(|_| array.push(&self.folder, &unknown))?;
             }
             self.filled = place;
@@ -102,7 +103,7 @@ impl SnapshotStore {
 
     /// Adds the next member of another store unchanged.
     pub fn copy(&mut self, from: &mut StoredMembers) -> Result<()> {
-        for (array, from) in self.fields.iter_mut().chain([&mut self.status]).zip(&mut from.arrays) {
+        for (array, from) in self.growing.iter_mut().zip(&mut from.arrays) {
             let mut left = from.size;
             while left > 0 {
                 let part = from.next(left)?;
@@ -116,7 +117,7 @@ impl SnapshotStore {
     /// Returns its extent, once it is on disk.
     pub fn mark(&self) -> Result<StoreMark> {
         self.folder.sync()?;
-        Ok(StoreMark { arrays: self.fields.iter().chain([&self.status]).map(|array| array.mark.clone()).collect() })
+        Ok(StoreMark { arrays: self.growing.iter().map(|array| array.mark.clone()).collect() })
     }
 
     /// Sets whether to keep it if the run fails.
@@ -135,7 +136,7 @@ impl SnapshotStore {
 
     fn from(mut self, mark: &StoreMark) -> Result<SnapshotStore> {
         let mut fits = true;
-        for (array, mark) in self.fields.iter_mut().chain([&mut self.status]).zip(&mark.arrays) {
+        for (array, mark) in self.growing.iter_mut().zip(&mark.arrays) {
             fits &= array.resume_from(mark);
         }
         match fits {

@@ -174,7 +174,10 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
         let rest = wording.rests.get(i).map_or(&[][..], Vec::as_slice);
         let fitted =
             |text: &str| if medium.is_screen() { text.into() } else { shortened(text, SIZE, side + 0.5 * GAP) };
-        draw_panel(&mut svg, panel, corner, &layout, rest, [&wording.unit, &fitted(cell), &fitted(end)]);
+        let words = [&*wording.unit, &fitted(cell), &fitted(end)];
+        svg.group(&format!("panel {}", panel.film.status.name()), |svg| {
+            draw_panel(svg, panel, corner, &layout, rest, words);
+        });
     }
     let foot = DVec2::new(MARGIN, height - 20.0);
     match layout.common {
@@ -228,8 +231,6 @@ fn draw_panel(
 ) {
     let frame = layout.frame;
     let middle = corner + 0.5 * frame;
-    let Film { status, points, .. } = panel.film;
-    svg.open(&format!("panel {}", status.name()));
     svg.rectangle("frame", corner, frame, 6.0);
     let mut across = String::new();
     if let Some(bounds) = panel.bounds() {
@@ -246,7 +247,10 @@ fn draw_panel(
             let nodes = place(nodes);
             let class = if i == last { "after" } else { ["before", "way"][usize::from(i > 0)] };
             svg.path(class, &closed_path(&nodes));
-            if i == last && nodes.len() == *points && polygon::length(&nodes) >= MIN_SPACING * nodes.len() as f64 {
+            if i == last
+                && nodes.len() == panel.film.points
+                && polygon::length(&nodes) >= MIN_SPACING * nodes.len() as f64
+            {
                 svg.path("nodes", &dots(&nodes));
             }
         }
@@ -258,7 +262,6 @@ fn draw_panel(
     svg.text_unless_empty("middle", below + DVec2::new(0.0, LINE), cell);
     let lines = if cell.is_empty() { 1.0 } else { 2.0 };
     svg.text("middle word", below + DVec2::new(0.0, lines * LINE), end);
-    svg.close();
 }
 
 /// A bar of a round length: 1, 2 or 5 times a power of ten, at most half a panel long.

@@ -43,7 +43,9 @@ impl Movie {
             svg.text("note end", DVec2::new(self.size.x - MARGIN, 28.0), &self.head());
         }
         self.clock_in(&mut svg);
-        self.panels.iter().for_each(|panel| self.panel(&mut svg, panel));
+        for panel in &self.panels {
+            svg.group(&format!("panel {}", panel.member.status.name()), |svg| self.panel(svg, panel));
+        }
         match self.bar() {
             Some((ends, text)) => draw_bar(&mut svg, ends, text),
             None => svg.text("note", self.foot() + DVec2::new(0.0, 4.0), OWN_SCALES),
@@ -73,8 +75,6 @@ impl Movie {
     }
 
     fn panel(&self, svg: &mut Svg, panel: &MoviePanel) {
-        let status = panel.member.status;
-        svg.open(&format!("panel {}", status.name()));
         svg.rectangle("frame", panel.corner, self.frame, 0.0);
         if !panel.member.start().is_empty() {
             svg.line(format_args!("<g transform=\"scale(0.1)\">"));
@@ -89,7 +89,7 @@ impl Movie {
                  values=\"{states}\" {}/>{filled}</path>",
                 self.timing(";1")
             ));
-            svg.close();
+            svg.line(format_args!("</g>"));
         }
         for (i, name) in panel.names.iter().enumerate() {
             svg.text("middle", self.words(panel, i), &shortened(name, SIZE, self.frame.x));
@@ -100,7 +100,6 @@ impl Movie {
             "<text class=\"middle word\" x=\"{x}\" y=\"{y}\" opacity=\"0\">{end}{}</text>",
             self.switched("opacity", 1.0, panel)
         ));
-        svg.close();
     }
 
     /// Fills a member once it has relaxed.

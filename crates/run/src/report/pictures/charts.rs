@@ -414,16 +414,15 @@ impl FinishedRun<'_> {
     }
 
     fn mesh(&self, medium: Medium) -> PageFigure {
-        let title = "Mesh quality at the end";
+        let text = self.text(medium, "Mesh quality at the end", "", &CellKey::default());
         let quality = MeshQuality {
-            title,
-            note: &self.note(medium, ""),
+            text,
             mesh_ratio: &self.tally.mesh_ratios,
             metric_drift: &self.tally.metric_drifts,
             distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
-        figure(names::MESH, title, caption, quality.draw(medium))
+        figure(names::MESH, &quality.text.title, caption, quality.draw(medium))
     }
 }
 
