@@ -90,17 +90,12 @@ impl Claim {
     }
 
     /// Whether the folder that is held is the one at its path.
-    fn is_there(&self) -> io::Result<bool> {
+    pub fn is_there(&self) -> io::Result<bool> {
         self.folder.as_ref().map_or(Ok(true), |folder| lies_at(folder, self.place.shown()))
     }
 
     fn has_its_file(&self) -> io::Result<bool> {
         lies_at(&self.lock, self.place.join(LOCK).at())
-    }
-
-    /// Whether the folder is still the one at its path, as far as this can be known.
-    pub fn stays(&self) -> bool {
-        self.is_there().unwrap_or(false)
     }
 }
 
@@ -171,7 +166,7 @@ mod tests {
         );
         fs::create_dir(&out).unwrap();
         let second = Claim::take(&out).unwrap().unwrap();
-        assert!(matches!(first.check(), Err(Error::Lost(_))) && !first.stays());
+        assert!(matches!(first.check(), Err(Error::Lost(_))) && !first.is_there().unwrap());
         second.check().unwrap();
         drop(first);
         assert_eq!((names(&out), names(&moved)), (vec![LOCK.into()], vec![]));

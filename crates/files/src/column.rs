@@ -5,6 +5,8 @@ use serde::Serialize;
 
 use super::fields::Fields;
 use curvelax_base::error::Result;
+use curvelax_ensemble::Status;
+use curvelax_flow::number::Precision;
 
 /// A row of a table, as the program holds it.
 pub trait TableRow: Sized + 'static {
@@ -115,9 +117,10 @@ kinds! {
     /// An integer of either sign.
     signed of i32, "integer": |v| Field::Signed(i64::from(*v)), |fields| fields.whole();
     /// How a member ended.
-    status of curvelax_ensemble::Status, "word": |v| Field::Word(v.name()), |fields| fields.status();
+    status of Status, "word": |v| Field::Word(v.name()), |fields| fields.one_of(Status::ALL, Status::name);
     /// The numbers in which a member was computed.
-    precision of curvelax_flow::number::Precision, "word": |v| Field::Word(v.name()), |fields| fields.precision();
+    precision of Precision, "word": |v| Field::Word(v.name()),
+        |fields| fields.one_of([Precision::F32, Precision::F64], Precision::name);
     /// A count or an index, or none.
     rank of Option<u64>, "integer": |v| v.map_or(Field::Float(None), Field::Whole), |fields| fields.whole_or_none();
     /// Any word.

@@ -6,8 +6,6 @@ use csv::StringRecord;
 
 use super::names::spoilt;
 use curvelax_base::error::{Error, Result, shortened};
-use curvelax_ensemble::Status;
-use curvelax_flow::number::Precision;
 
 /// Characters of foreign text in a message.
 const SHOWN: usize = 200;
@@ -50,18 +48,8 @@ impl Fields<'_> {
         self.or_none("true, false", |word| word.parse().ok())
     }
 
-    /// The name of a status.
-    pub fn status(&mut self) -> Result<Status> {
-        self.one_of(Status::ALL, Status::name)
-    }
-
-    /// The name of a precision.
-    pub fn precision(&mut self) -> Result<Precision> {
-        self.one_of([Precision::F32, Precision::F64], Precision::name)
-    }
-
     /// One of these values, by its name.
-    fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N], name: impl Fn(T) -> &'static str) -> Result<T> {
+    pub fn one_of<T: Copy, const N: usize>(&mut self, all: [T; N], name: impl Fn(T) -> &'static str) -> Result<T> {
         let word = self.word();
         let value = all.into_iter().find(|value| name(*value) == word);
         value.ok_or_else(|| self.unexpected(&all.map(name).join(", ")))

@@ -87,7 +87,7 @@ impl Growing {
             Some(mark) => Some(SnapshotStore::resume(folder.store_again(names::STORE)?, spec, points, mark)?),
             None => None,
         };
-        let spill = rows.map(|mark| Spill::resume(folder, mark)).transpose()?;
+        let spill = rows.map(|mark| Spill::new(folder.file_again(mark)?)).transpose()?;
         let growing = Growing::of(spec, store, |name| {
             let mark = marks.iter().find(|mark| mark.name == name).ok_or_else(others)?;
             folder.file_again(mark)
@@ -157,7 +157,7 @@ impl Growing {
     pub fn spill(&mut self, folder: &OutputFolder, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Extent> {
         let spill = match self.spill.take() {
             Some(spill) => spill,
-            None => Spill::begin(folder)?,
+            None => Spill::new(folder.file(names::ROWS)?)?,
         };
         self.spill.insert(spill).add(series, snapshots)
     }

@@ -9,11 +9,7 @@ use std::{
     io::{Read, Seek, SeekFrom, Write},
 };
 
-use super::{
-    folder::OutputFolder,
-    names,
-    part_file::{Mark, PartFile},
-};
+use super::part_file::{Mark, PartFile};
 use curvelax_base::{
     error::{Error, Result},
     input,
@@ -30,17 +26,8 @@ pub struct Spill {
 }
 
 impl Spill {
-    /// Begins it.
-    pub fn begin(folder: &OutputFolder) -> Result<Spill> {
-        Spill::of(folder.file(names::ROWS)?)
-    }
-
-    /// Continues the file of an interrupted run.
-    pub fn resume(folder: &OutputFolder, mark: &Mark) -> Result<Spill> {
-        Spill::of(folder.file_again(mark)?)
-    }
-
-    fn of(file: PartFile) -> Result<Spill> {
+    /// Begins in `file`, which is called [`ROWS`](super::names::ROWS), or continues after the rows in it.
+    pub fn new(file: PartFile) -> Result<Spill> {
         let reader = input::open(file.part().at()).map_err(file.part().io("cannot read"))?;
         Ok(Spill { file, reader })
     }
@@ -91,6 +78,7 @@ impl Spill {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{OutputFolder, names::ROWS};
 
     #[test]
     fn rows_come_back_as_they_were_also_from_where_a_run_was_interrupted() {
@@ -103,7 +91,7 @@ mod tests {
                 Snapshot { member, t: 0.2, x: vec![1.0, -0.0], y: vec![f64::MAX; 2], k: vec![3.0; 2], r: vec![0.1; 2] };
             (series, vec![snapshot; member as usize])
         };
-        let mut spill = Spill::begin(&folder).unwrap();
+        let mut spill = Spill::new(folder.file(ROWS).unwrap()).unwrap();
         let add = |spill: &mut Spill, member: u64| spill.add(&rows(member).0, &rows(member).1).unwrap();
         let (one, two) = (add(&mut spill, 1), add(&mut spill, 2));
         assert_eq!((spill.read(&two).unwrap(), spill.read(&one).unwrap()), (rows(2), rows(1)));
@@ -114,7 +102,7 @@ mod tests {
         drop(spill);
 
         folder.check(&mark).unwrap();
-        let mut again = Spill::resume(&folder, &mark).unwrap();
+        let mut again = Spill::new(folder.file_again(&mark).unwrap()).unwrap();
         assert!(again.read(&late).is_err(), "what came after the mark is cut off");
         assert_eq!((again.read(&one).unwrap(), again.read(&two).unwrap()), (rows(1), rows(2)));
         let other = add(&mut again, 4);

@@ -20,11 +20,9 @@ const NAME: f64 = 260.0;
 
 /// The times of a few members.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct MemberTimes<'a> {
+pub struct MemberTimes {
     /// What is said of it.
     pub text: ChartText,
-    /// What the names are.
-    pub names: &'a str,
     /// The members, from top to bottom.
     pub members: Vec<MemberDot>,
 }
@@ -49,11 +47,6 @@ impl MemberDot {
         [self.t - error, self.t + error]
     }
 
-    /// Whether its time can be drawn.
-    fn is_drawable(&self, scale: Scale) -> bool {
-        scale.holds(self.t)
-    }
-
     fn draw(&self, svg: &mut Svg, panel: &Panel, y: f64) {
         let (low, high) = panel.x.range();
         let [left, right] = self.ends().map(|t| panel.across(t.clamp(low, high)));
@@ -69,14 +62,14 @@ impl MemberDot {
     }
 }
 
-impl MemberTimes<'_> {
+impl MemberTimes {
     /// The text of an SVG file.
     pub fn draw(&self, medium: Medium) -> String {
-        let MemberTimes { text, names, members } = self;
+        let MemberTimes { text, members } = self;
         let mut heading = text.heading([]);
         let reached = || members.iter().filter(|member| member.happened).map(|member| member.t);
         let scale = Scale::of(members.iter().map(|member| member.t));
-        if !members.iter().any(|member| member.is_drawable(scale)) {
+        if !members.iter().any(|member| scale.holds(member.t)) {
             return heading.nothing(medium, "No member has a time.");
         }
         let height = ROW * members.len() as f64;
@@ -90,16 +83,15 @@ impl MemberTimes<'_> {
         let range = reached().fold((f64::INFINITY, 0.0_f64), |(low, high), t| (low.min(t), high.max(t)));
         let across = if range.0 < 0.7 * range.1 { across.with_zero() } else { across };
         let rows = Axis::new("", "", Scale::Linear, (0.0, members.len() as f64));
-        let panel = named_rows(&mut svg, [&across, &rows], (&shown, names), (top + 24.0, height), 0.0);
+        let panel = named_rows(&mut svg, [&across, &rows], (&shown, ""), (top + 24.0, height), 0.0);
         let DVec2 { x: left, y: top } = panel.corner;
-        svg.text_unless_empty("note end", DVec2::new(left - 8.0, top - 8.0), names);
         svg.group("s0", |svg| {
             for (i, (member, name)) in members.iter().zip(&shown).enumerate() {
                 let y = top + ROW * (i as f64 + 0.5);
                 svg.text_unless_empty("y tick end", DVec2::new(left - 8.0, y + 4.0), name);
                 let line = [DVec2::new(left, y), DVec2::new(panel.end().x, y)];
                 svg.path("grid", &trace::path(&line));
-                if member.is_drawable(scale) {
+                if scale.holds(member.t) {
                     member.draw(svg, &panel, y);
                 }
             }

@@ -12,7 +12,7 @@ use crate::{
     medium::Medium,
     svg::Svg,
 };
-use curvelax_base::text::{count, significant};
+use curvelax_base::text::significant;
 
 /// Mesh quality of the members at their end.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -23,8 +23,8 @@ pub struct MeshQuality<'a> {
     pub mesh_ratio: &'a [f32],
     /// max |r_i − |e_i||/|e_i|, one number per member.
     pub metric_drift: &'a [f32],
-    /// Metric drift above which results are distrusted, and the number of members above it; or nothing.
-    pub distrusted: Option<(f64, u64)>,
+    /// Metric drift above which results are distrusted, and the number of members above it.
+    pub distrusted: (f64, usize),
 }
 
 /// The values of one panel.
@@ -95,21 +95,18 @@ impl MeshQuality<'_> {
     pub fn draw(&self, medium: Medium) -> String {
         let ratio = MeshMeasure::new("mesh_ratio", self.mesh_ratio);
         let drift = MeshMeasure::new("metric_drift", self.metric_drift);
-        let distrusted = self.distrusted.filter(|(bound, _)| Scale::Log.holds(*bound));
-        let verdict = match distrusted {
-            Some((bound, above)) if above > 0 => {
-                format!("{} with metric_drift above {}.", count(above, "member"), significant(bound, 1))
-            }
-            _ => String::new(),
-        };
+        let (bound, above) = self.distrusted;
+        let shown = significant(bound, 1);
+        let verdict = some(above, "member", &format!("with metric_drift above {shown}."));
         let mut heading = self.text.heading([verdict, ratio.sentence(), drift.sentence()]);
-        let label = |(bound, _)| format!("metric_drift {}, above which results are distrusted", significant(bound, 1));
-        let shown = distrusted.filter(|(_, above)| *above > 0).map(label);
-        heading.legend = shown.iter().map(|label| Entry::new("ink", LegendMark::Dashed, label)).collect();
+        if above > 0 {
+            let label = format!("metric_drift {shown}, above which results are distrusted");
+            heading.legend.push(Entry::new("ink", LegendMark::Dashed, &label));
+        }
         let places = PanelGrid::new(medium, 0.0);
         let (mut svg, top) = heading.begin(medium, places.height(2));
         ratio.draw(&mut svg, &places, (0, top), None);
-        drift.draw(&mut svg, &places, (1, top), distrusted.map(|(bound, _)| bound));
+        drift.draw(&mut svg, &places, (1, top), Some(bound));
         svg.finish()
     }
 }

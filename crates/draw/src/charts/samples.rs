@@ -252,7 +252,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
         let [mesh_ratio, metric_drift] =
             [mesh_ratio, metric_drift].map(|values| values.iter().map(|v| *v as f32).collect::<Vec<_>>());
         let [mesh_ratio, metric_drift] = [&mesh_ratio[..], &metric_drift[..]];
-        let distrusted = Some((0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count() as u64));
+        let distrusted = (0.1, metric_drift.iter().filter(|drift| **drift > 0.1).count());
         let text = text("Mesh quality at the end", "", CellKey::default());
         MeshQuality { text, mesh_ratio, metric_drift, distrusted }.draw(medium)
     };
@@ -335,7 +335,7 @@ pub fn draw_all(medium: Medium) -> Vec<(String, String)> {
 
     let few = |members: Vec<MemberDot>| {
         let text = self::text("Relaxation times", "t_limit", CellKey::default());
-        MemberTimes { text, names: "outline", members }.draw(medium)
+        MemberTimes { text, members }.draw(medium)
     };
     let dot =
         |name: &str, t: f64, error: Option<f64>, happened: bool| MemberDot { name: name.into(), t, error, happened };

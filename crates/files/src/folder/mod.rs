@@ -185,7 +185,7 @@ impl Drop for OutputFolder {
             let _ = fs::remove_dir(self.place(PLOTS).at());
         }
         // Another folder may be in its place.
-        let stays = self.claim.as_ref().is_none_or(Claim::stays);
+        let stays = self.claim.as_ref().is_none_or(|claim| claim.is_there().unwrap_or(false));
         self.claim = None;
         // A folder that stays keeps its parents, including those that only its name goes through (`new/../out`).
         if stays {

@@ -409,7 +409,7 @@ impl FinishedRun<'_> {
         let (title, quantity) = ("Relaxation times", self.statistics.time());
         let caption = format!("Dot: {quantity} of a member.{bar}{open}");
         let text = self.text(medium, title, "", &CellKey::default());
-        let svg = MemberTimes { text, names: "", members }.draw(medium);
+        let svg = MemberTimes { text, members }.draw(medium);
         figure(names::MEMBER_TIMES, title, &caption, svg)
     }
 
@@ -419,7 +419,7 @@ impl FinishedRun<'_> {
             text,
             mesh_ratio: &self.tally.mesh_ratios,
             metric_drift: &self.tally.metric_drifts,
-            distrusted: Some((DISTRUSTED_DRIFT, self.tally.distrusted())),
+            distrusted: (DISTRUSTED_DRIFT, self.tally.distrusted() as usize),
         };
         let caption = "Longest over shortest edge, and how far the scheme's lengths have left the polygon's.";
         figure(names::MESH, &quality.text.title, caption, quality.draw(medium))
