@@ -46,7 +46,7 @@ pub struct RefereeFlags {
     #[arg(long, value_name = "P", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     decay: Option<Drawn<f64>>,
     /// Its law [default: amplitude-phase]
-    #[arg(long, value_name = "LAW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
+    #[arg(long, value_name = "HOW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
     perturbation: Option<Perturbation>,
     /// Its seed [default: 1]
     #[arg(long, value_name = "SEED", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]

@@ -55,7 +55,7 @@ impl Watch {
 
     fn new(condition: &Condition, start: &Observed<f64>, unit: f64, precision: Precision, resolution: f64) -> Watch {
         let Condition { observable, falls, .. } = *condition;
-        let level = precision.rounded(condition.level_in(unit, start));
+        let level = precision.rounded(condition.threshold_in(unit, start));
         let is_excess = observable == Observable::Excess;
         // As for t_half: the excess of a regular polygon is rounding.
         let is_round = is_excess && falls && start.excess <= ROUND;
