@@ -60,7 +60,7 @@ pub struct RefereeFlags {
     /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
     #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(), requires = "referee", help_heading = REFEREE)]
     form: Option<PositionForm>,
-    /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
+    /// Rate κ of the pull, as for `curvelax run` [default: auto]
     #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<Pull>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     pull: Option<Pull>,
 }
