@@ -60,7 +60,7 @@ def run(
         Shapely and all other objects with ``__geo_interface__`` are outlines; of a GeoSeries or GeoDataFrame the index is
         the labels and its columns serve ``group_by``. A path to a ``.roi`` or ``.zip`` of ImageJ gives the polygons,
         freehand and traced regions, rectangles and ovals in it, labelled by their names, in pixels with y downwards as in the
-        image; ``pip install roifile`` reads them. ``amplitude`` and ``decay`` take a law such as ``"gamma(2,0.02)"``, an
+        image; ``pip install roifile`` reads them. ``amplitude`` and ``decay`` take a distribution such as ``"gamma(2,0.02)"``, an
         array with a value for each member, or a frozen distribution of ``scipy.stats``.
 
     Returns

@@ -45,7 +45,7 @@ pub struct RefereeFlags {
     /// Its power p: mode m has standard deviation σ m^-p [default: 1]
     #[arg(long, value_name = "P", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     decay: Option<Drawn<f64>>,
-    /// Its law [default: amplitude-phase]
+    /// Its distribution [default: amplitude-phase]
     #[arg(long, value_name = "HOW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
     perturbation: Option<Perturbation>,
     /// Its seed [default: 1]
