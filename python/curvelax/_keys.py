@@ -12,11 +12,11 @@ class Keys(TypedDict, total=False):
     """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
 
     curves: int
-    """Number of members. For outlines, the number of copies of each, perturbed by amplitude; without the flag,
-    several outlines, or files:PATTERN, run once each, unperturbed. By default 256."""
+    """Number of members: perturbed copies of the curve, or of each outline. Without the flag, several outlines, or
+    those of files:PATTERN, are one unperturbed member each. By default 256."""
 
     outlines: int
-    """Expected number of outlines: another number is refused. The spec of a run records it. By default any number."""
+    """Fail unless exactly this many outlines are read. The spec of a run records it. By default any number."""
 
     group_by: str
     """Compare the outlines by the values of this property of their features, column of their table, or `file`. By
@@ -30,16 +30,16 @@ class Keys(TypedDict, total=False):
 
     shape: Any
     """Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the
-    outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are relative
-    to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below. By default
-    ellipse:2,1."""
+    outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy). A single outline of file: becomes curves
+    perturbed copies; several, or those of files:, are one unperturbed member each. Paths are relative to the current
+    folder. Any number may be a distribution, such as uniform(1.2..3): see below. By default ellipse:2,1."""
 
     sampling: Literal["parameter", "arclength", "points"]
     """Placement of the nodes on the curve. By default arclength."""
 
     interpolate: Literal["auto", "spline", "polygon"]
-    """How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline
-    with corners where the direction turns by more than half a radian. By default auto."""
+    """How the curve of an outline runs between its data points: as a polygon, as a cubic spline, or (auto) as a
+    spline with corners where the direction turns by more than half a radian. By default auto."""
 
     rounding: float
     """Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
@@ -59,8 +59,8 @@ class Keys(TypedDict, total=False):
     A/L^2, 0.05 to 1; or a distribution. Needs conserve area,length. By default as it is."""
 
     perturbation: Literal["amplitude-phase", "gaussian"]
-    """Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of cos
-    and sin with the same power. By default amplitude-phase."""
+    """Distribution of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal
+    coefficients of cos and sin with the same power. By default amplitude-phase."""
 
     design: Literal["random", "sobol", "lhs"]
     """How the members of a cell are spread over the distributions of shape, flow, energy, diffusivity, drive,
@@ -78,21 +78,22 @@ class Keys(TypedDict, total=False):
     """Draw member j of every cell from the same random numbers. By default false."""
 
     sweep: Mapping[str, Sequence[Any]]
-    """Vary this key: a cell of members for each value, and for each combination if the flag is given for several
-    keys. Separate values that contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default none."""
+    """Vary this key: a cell of members for each value, or for each combination of values if the flag is given for
+    several keys. Separate values that contain commas by semicolons: sweep 'shape=ellipse:2,1;circle:1'. By default
+    none."""
 
     flow: str
     """Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions. By default
     surface-diffusion."""
 
     energy: str
-    """Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG] is
-    1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any number may
-    be a distribution. energy 1 is isotropic, but in the geometric form. By default 1."""
+    """Surface energy γ of a crystal (anisotropic) under surface diffusion, by the angle ψ of the outward normal:
+    cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below
+    1. Any number may be a distribution. energy 1 is isotropic, but in the geometric form. By default 1."""
 
     diffusivity: str
-    """Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
-    DEG), above 0 in all directions; a sum of two as for energy. By default 1."""
+    """Mobility of the atoms along the surface of a crystal: cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG), above 0 in all
+    directions; a sum of two as for energy. Any number may be a distribution. By default 1."""
 
     drive: float | str | Any
     """Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
@@ -101,8 +102,8 @@ class Keys(TypedDict, total=False):
 
     conserve: str
     """Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-    vesicle: it is relaxed when its energy stays within relax-to of its largest distance from its end. By default
-    neither."""
+    vesicle: it is relaxed from the time after which |E - E_end| stays below relax-to times its maximum over the run.
+    By default neither."""
 
     conserve_at: Sequence[float]
     """The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are scaled
@@ -152,8 +153,8 @@ class Keys(TypedDict, total=False):
     off."""
 
     refine: bool
-    """Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n →
-    ∞: columns t_limit, t_error, order and points of summary.csv; with drive t_vanish, too: t_vanish_limit and
+    """Run every member also with n/2, n/√2 and n nodes and a tenth of the step tolerance, and extrapolate t_relax to
+    n → ∞: columns t_limit, t_error, order and points of summary.csv; with drive t_vanish, too: t_vanish_limit and
     t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to 1600 nodes. By default
     false."""
 
@@ -168,9 +169,9 @@ class Keys(TypedDict, total=False):
     the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member. By default 0."""
 
     form: Literal["paper", "geometric", "auto"]
-    """What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the force
-    of the polygon itself, which halves the error of smooth, well resolved curves and fails for others; auto: paper.
-    By default paper; geometric with energy, diffusivity, drive and conserve."""
+    """Which discretisation moves the nodes. paper: that of the curvatures and segment lengths that the scheme
+    evolves; geometric: the force of the polygon itself, which halves the error of smooth, well resolved curves and
+    fails for others; auto: the default. By default paper; geometric with energy, diffusivity, drive and conserve."""
 
     solver: Literal["auto", "gauss-seidel", "direct"]
     """Solver of the pentadiagonal systems. auto is gauss-seidel with tau and direct with adaptive. By default
@@ -201,21 +202,21 @@ class Keys(TypedDict, total=False):
     """Number type. By default f64 where the device has it."""
 
     threads: int
-    """Threads that make and evaluate members and, on the CPU, advance them. By default all cores."""
+    """Threads that prepare and analyse members and, on the CPU, advance them. By default all cores."""
 
     event: str | Sequence[str]
-    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
-    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
-    (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For
-    several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 * start'. By default
-    none."""
+    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=THRESHOLD, or with
+    >=. A threshold is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max,
+    mesh_ratio (longest over shortest segment) and metric_drift (largest relative difference between the lengths r
+    that the scheme evolves and those of the segments). For several events give it several times: event 'convex =
+    k_min >= 0' event 'slow = excess <= 0.5 * start'. By default none."""
 
     events: Mapping[str, str]
-    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL. A
-    level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
-    (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments). For
-    several events give it several times: event 'convex = k_min >= 0' event 'slow = excess <= 0.5 * start'. By default
-    none."""
+    """Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=THRESHOLD, or with
+    >=. A threshold is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max,
+    mesh_ratio (longest over shortest segment) and metric_drift (largest relative difference between the lengths r
+    that the scheme evolves and those of the segments). For several events give it several times: event 'convex =
+    k_min >= 0' event 'slow = excess <= 0.5 * start'. By default none."""
 
     series: float
     """Write series.csv: one row per member every DT. By default off."""

@@ -49,7 +49,7 @@ def run(
         Write into an existing folder, replacing the earlier run in it. A folder that holds anything else is refused.
     progress
         Whether to show how far the run is; by default in notebooks and terminals. With tqdm it is a bar of tqdm. A function
-        is called with the members that have ended, all members, and the share of the work that is done.
+        is called with the runs of members that have ended, all runs, and the share of the work that is done.
     **keys
         Keys of the spec, with ``_`` for ``-``: ``curves=1000``, ``flow="willmore"``, ``t_end="auto"``,
         ``sweep={"amplitude": [0.05, 0.1]}``. ``accurate=True`` is ``--accurate``, and ``events={"half": "excess <= 0.5 *
@@ -60,7 +60,7 @@ def run(
         Shapely and all other objects with ``__geo_interface__`` are outlines; of a GeoSeries or GeoDataFrame the index is
         the labels and its columns serve ``group_by``. A path to a ``.roi`` or ``.zip`` of ImageJ gives the polygons,
         freehand and traced regions, rectangles and ovals in it, labelled by their names, in pixels with y downwards as in the
-        image; ``pip install roifile`` reads them. ``amplitude`` and ``decay`` take a law such as ``"gamma(2,0.02)"``, an
+        image; ``pip install roifile`` reads them. ``amplitude`` and ``decay`` take a distribution such as ``"gamma(2,0.02)"``, an
         array with a value for each member, or a frozen distribution of ``scipy.stats``.
 
     Returns
@@ -260,7 +260,7 @@ def _bar(progress: bool | Progress | None) -> Iterator[Progress]:
     with tqdm(total=1.0, bar_format=bar_format, leave=False) as bar:
 
         def show(done: int, total: int, share: float) -> None:
-            bar.set_description_str(f"{done} of {total} members", refresh=False)
+            bar.set_description_str(f"{done} of {total} runs", refresh=False)
             bar.update(share - bar.n)
 
         yield show
@@ -277,7 +277,7 @@ def _line() -> Iterator[Progress]:
 
     def show(done: int, total: int, share: float) -> None:
         nonlocal width
-        words = f"{100 * share:3.0f} % {done} of {total} members"
+        words = f"{100 * share:3.0f} % {done} of {total} runs"
         if handle is not None:
             handle.update(HTML(f'<progress max="1" value="{share:.3f}"></progress> {words}'))
         elif sys.stderr is not None:

@@ -88,8 +88,8 @@ mod _curvelax {
     /// Runs the file `spec`, or the defaults, with `keys` instead of its own in the folder `out`, and returns the
     /// overview and the snapshots.
     ///
-    /// `existing` is as in `check_place`. `progress` is called with the members that have ended, all members and the
-    /// share of the work done; `say` with notes and warnings.
+    /// `existing` is as in `check_place`. `progress` is called with the runs of members that have ended, all runs and
+    /// the share of the work done; `say` with notes and warnings.
     #[pyfunction]
     fn run(
         py: Python<'_>,

@@ -20,7 +20,7 @@ Examples:
   curvelax animate ellipses --out three.gif --members 3 --seconds 10 --width 600
 
 Members stand side by side, to one scale, with their start in grey. Between the times of plots/portraits.json their nodes
-move on straight lines. The clock in the picture runs so that the curves move evenly: slowly at first, ever faster later.
+move on straight lines. Physical time advances slowly at first and faster later, so that the motion looks even.
 The same folder gives the same bytes on every machine.";
 
 /// Make a movie of the first members of a finished run.

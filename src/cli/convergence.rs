@@ -65,7 +65,7 @@ pub struct ConvergenceArgs {
     work_precision: bool,
     #[command(flatten)]
     referee: RefereeFlags,
-    /// Solver of the pentadiagonal systems; sweeps take longer [default: direct; with --work-precision all]
+    /// Solver of the pentadiagonal systems; Gauss-Seidel takes longer [default: direct; with --work-precision all]
     #[arg(long, value_name = "SOLVER", value_parser = parsers::word::<SolverChoice>(), help_heading = flags::METHOD)]
     solver: Option<SolverChoice>,
     /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]

@@ -2,12 +2,13 @@
 
 use super::{print, print_json, report_flags::ReportFlags};
 use crate::{
+    backend::DeviceKind,
     ensemble::Spec,
     error::Result,
     estimate::{Estimate, Pilot},
     report::{Stop, words::machine},
     session::{Host, PlacedStudy},
-    text::{bytes, duration, plural},
+    text::{bytes, count, duration, plural},
 };
 
 /// Estimates the run of `placed` by pilots that `stop` ends, and prints the estimate as `host` was asked to.
@@ -29,33 +30,39 @@ pub fn dry_run(placed: PlacedStudy, stop: &Stop, host: &ReportFlags) -> Result<(
 /// The table.
 fn table(estimate: &Estimate, spec: &Spec) -> String {
     let Estimate { members, cells, slots, pilot, .. } = estimate;
-    let unknown = |what: &str| format!("not known: the pilot was over before {what}");
-    let which = plural(*members, "member");
+    let unknown = |what: &str| format!("unknown: the pilot was over before {what}");
+    let on_gpu = |text: String| if estimate.platform.backend == DeviceKind::Gpu { text } else { String::new() };
     // Whether some members may need levels of which the pilot has not told.
     let is_open = spec.refine && estimate.finer_members.is_none() && estimate.most_points > spec.points;
     let rows = [
-        ("members", format!("{members} in {cells} {}", plural(*cells as u64, "cell"))),
+        ("members", format!("the run has {} in {cells} {}", count(*members, "member"), plural(*cells as u64, "cell"))),
         ("levels", levels(estimate, is_open)),
-        ("back end", format!("{}; solver {}", machine(&estimate.platform), spec.solver().name())),
-        ("resident", format!("{} {which} at once", (*slots as u64).min(*members))),
-        ("memory", format!("about {}", bytes(estimate.memory_bytes))),
-        ("disk", format!("about {}", bytes(estimate.disk_bytes))),
+        ("back end", format!("it runs on {}; solver {}", machine(&estimate.platform), spec.solver().name())),
+        ("resident", format!("{} at once are in memory", count((*slots as u64).min(*members), "member"))),
+        ("memory", format!("it needs about {}", bytes(estimate.memory_bytes))),
+        ("disk", format!("its files take about {}", bytes(estimate.disk_bytes))),
         (
             "steps",
-            estimate.steps_per_member.map_or(unknown("a member ended"), |steps| format!("about {steps:.0} per member")),
+            estimate
+                .steps_per_member
+                .map_or(unknown("a member ended"), |steps| format!("each member takes about {steps:.0} on average")),
         ),
-        ("dispatches", estimate.dispatches.map_or(unknown("a step"), |count| format!("about {count}"))),
-        ("start-up", duration(estimate.start_up_seconds)),
+        (
+            "dispatches",
+            on_gpu(estimate.dispatches.map_or(unknown("a step"), |count| format!("there are about {count}"))),
+        ),
+        ("start-up", on_gpu(format!("it takes {}", duration(estimate.start_up_seconds)))),
         (
             "time",
             estimate.seconds.map_or(unknown("a step"), |seconds| {
-                let without = if is_open { ", without levels of more nodes" } else { "" };
-                format!("about {} after start-up{without}", duration(seconds))
+                let without = if is_open { ", without resolutions of more nodes" } else { "" };
+                format!("the run takes about {}{}{without}", duration(seconds), on_gpu(" after start-up".into()))
             }),
         ),
         ("pilot", started(pilot)),
     ];
-    rows.iter().map(|(label, text)| format!("{label:<11}{text}\n")).collect()
+    let told = rows.iter().filter(|(_, text)| !text.is_empty());
+    told.map(|(label, text)| format!("{label:<11}{text}\n")).collect()
 }
 
 /// What became of the members of the pilot. If some failed, the rest of the estimate is that of short runs.
@@ -64,7 +71,7 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
         0 => String::new(),
         _ => format!("; {failed} failed: a run with --only 0 says why"),
     };
-    format!("{ended} of {members} started members ended in {}{failed}", duration(*seconds))
+    format!("{members} members were started for this estimate, and {ended} ended, in {}{failed}", duration(*seconds))
 }
 
 /// The further runs of members, for the error of discretisation.
@@ -75,27 +82,30 @@ fn levels(
     let finer = match *finer_members {
         Some(0) => String::new(),
         Some(finer) => {
-            format!("; about {finer} {} more nodes, up to n = {most_points}", if finer == 1 { "needs" } else { "need" })
+            let need = if finer == 1 { "member needs" } else { "members need" };
+            format!("; about {finer} {need} more nodes, up to n = {most_points}")
         }
         None if is_open => {
-            format!("; some may need more nodes, up to n = {most_points}: the pilot was over before it could tell")
+            format!(
+                "; some members may need more nodes, up to n = {most_points}: the pilot was over before it could tell"
+            )
         }
         None => String::new(),
     };
     let varied = match varied_members {
         0 => String::new(),
-        members => format!("; {members} more on other curves through the points of the outlines"),
+        members => format!("; {members} more are on other curves through the data points of the outlines"),
     };
     match *level_members {
-        0 => "none: the error of discretisation will not be known".into(),
-        members => format!("{members} more {} at other resolutions{finer}{varied}", plural(members, "run")),
+        0 => "no member runs at other resolutions: the error of discretisation will be unknown".into(),
+        1 => format!("there is 1 more run at another resolution{finer}{varied}"),
+        runs => format!("there are {runs} more runs of members at other resolutions{finer}{varied}"),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::backend::DeviceKind;
     use crate::{number::Precision, placement::Platform};
 
     #[test]
@@ -127,36 +137,41 @@ mod tests {
             pilot: Pilot { members: 130, ended: 130, failed: 0, relaxed: 129, rated: 120, seconds: 1.4 },
         };
         let expected = "\
-members    3000 in 1 cell
-levels     32 more runs at other resolutions
-back end   cpu, f64, 2 threads (asked for); solver gauss-seidel
-resident   128 members at once
-memory     about 17 MB
-disk       about 1.2 GB
-steps      about 2000 per member
-dispatches about 740
-start-up   0.01 s
-time       about 31.9 s after start-up
-pilot      130 of 130 started members ended in 1.40 s
+members    the run has 3000 members in 1 cell
+levels     there are 32 more runs of members at other resolutions
+back end   it runs on cpu, f64, 2 threads (asked for); solver gauss-seidel
+resident   128 members at once are in memory
+memory     it needs about 17 MB
+disk       its files take about 1.2 GB
+steps      each member takes about 2000 on average
+time       the run takes about 31.9 s
+pilot      130 members were started for this estimate, and 130 ended, in 1.40 s
 ";
         assert_eq!(table(&estimate, &Spec::default()), expected);
+        let on_gpu = Platform { backend: DeviceKind::Gpu, ..estimate.platform.clone() };
+        let on_gpu = table(&Estimate { platform: on_gpu, ..estimate.clone() }, &Spec::default());
+        let dispatched = "dispatches there are about 740\nstart-up   it takes 0.01 s\ntime       the run takes about 31.9 s after start-up\n";
+        assert!(on_gpu.contains(dispatched), "{on_gpu}");
         let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
-        let told = "levels     32 more runs at other resolutions; about 12 need more nodes, up to n = 1600\n";
+        let told = "levels     there are 32 more runs of members at other resolutions; about 12 members need more nodes, up to n = 1600\n";
         assert!(table(&finer, &Spec::default()).contains(told));
         let varied = Estimate { varied_members: 8, ..finer };
         assert!(
             table(&varied, &Spec::default())
-                .contains("n = 1600; 8 more on other curves through the points of the outlines\n")
+                .contains("n = 1600; 8 more are on other curves through the data points of the outlines\n")
         );
         // Pilots that end before their members do not tell which need more nodes.
         let untold = Estimate { finer_members: None, most_points: 1600, ..estimate.clone() };
         let untold = table(&untold, &Spec { refine: true, ..Spec::default() });
         assert!(
-            untold.contains("resolutions; some may need more nodes, up to n = 1600: the pilot was over"),
+            untold.contains("resolutions; some members may need more nodes, up to n = 1600: the pilot was over"),
             "{untold}"
         );
-        assert!(untold.contains("time       about 31.9 s after start-up, without levels of more nodes\n"), "{untold}");
+        assert!(
+            untold.contains("time       the run takes about 31.9 s, without resolutions of more nodes\n"),
+            "{untold}"
+        );
         let little = Estimate { steps_per_member: None, dispatches: None, seconds: None, ..estimate };
-        assert_eq!(table(&little, &Spec::default()).matches("not known: the pilot was over before a").count(), 3);
+        assert_eq!(table(&little, &Spec::default()).matches("unknown: the pilot was over before a").count(), 2);
     }
 }

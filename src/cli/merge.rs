@@ -22,9 +22,9 @@ Examples:
   curvelax merge shards/* --missing
       shards that are not finished, and the line that submits them to Slurm again
 
-The files are those that one run without --shard would have written, byte for byte except the times in run.json. Shards that
-are missing, unfinished, duplicated or modified are rejected by name, and so are those of another spec, seed, version or back
-end.";
+The files are those that one run without --shard would have written, byte for byte except the times and the
+number of threads in run.json. Shards that are missing, unfinished, duplicated or modified are rejected by name, and so are
+those of another spec, seed, version or back end.";
 
 /// Join the shards of a study.
 #[derive(clap::Args)]

@@ -45,8 +45,8 @@ pub struct RefereeFlags {
     /// Its power p: mode m has standard deviation σ m^-p [default: 1]
     #[arg(long, value_name = "P", value_parser = parsers::text_of::<Drawn<f64>>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     decay: Option<Drawn<f64>>,
-    /// Its law [default: amplitude-phase]
-    #[arg(long, value_name = "LAW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
+    /// Its distribution [default: amplitude-phase]
+    #[arg(long, value_name = "HOW", value_parser = parsers::word::<Perturbation>(), requires = "referee", help_heading = REFEREE)]
     perturbation: Option<Perturbation>,
     /// Its seed [default: 1]
     #[arg(long, value_name = "SEED", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
@@ -60,7 +60,7 @@ pub struct RefereeFlags {
     /// What moves the nodes, as for `curvelax run` [default: as with --accurate]
     #[arg(long, value_name = "FORM", value_parser = parsers::word::<PositionForm>(), requires = "referee", help_heading = REFEREE)]
     form: Option<PositionForm>,
-    /// Rate κ of the metric pull, as for `curvelax run` [default: auto]
+    /// Rate κ of the pull, as for `curvelax run` [default: auto]
     #[arg(long, value_name = "KAPPA", value_parser = parsers::text_of::<OrAuto>, requires = "referee", allow_hyphen_values = true, help_heading = REFEREE)]
     pull: Option<OrAuto>,
 }

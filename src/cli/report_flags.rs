@@ -29,7 +29,7 @@ pub struct ReportFlags {
     /// Print the results as one JSON document instead of the table
     #[arg(long, help_heading = flags::OUTPUT)]
     pub json: bool,
-    /// Exit with code 3 if a member ends neither relaxed nor unfinished
+    /// Exit with code 3 if any member fails: if its status is singular, nonfinite or stalled
     #[arg(long, help_heading = flags::OUTPUT)]
     strict: bool,
     /// Stop after this time, such as 90, 90s, 5m or 1h30m, with exit code 75; `curvelax resume` continues

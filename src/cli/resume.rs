@@ -15,11 +15,11 @@ Examples:
   curvelax resume ellipses
   curvelax resume ellipses --max-time 1h
   curvelax resume ellipses --backend cpu
-      continues on the CPU, wherever it began: digits then differ from those of an uninterrupted run
+      continues on the CPU, wherever it began: the last digits then differ from those of an uninterrupted run
 
-A run that was killed, was stopped or failed resumes from its last checkpoint, at most --checkpoint-every old. Members that
-have ended are not computed again. All files end up as those of an uninterrupted run, byte for byte except the times in
-run.json.";
+A run that was killed, was stopped or failed resumes from its last checkpoint: a kill loses at most one and a half times
+--checkpoint-every of work. Members that have ended are not computed again. All files end up as those of an uninterrupted
+run, byte for byte except the times in run.json.";
 
 /// Resume an interrupted run.
 #[derive(clap::Args)]
@@ -28,13 +28,13 @@ pub struct ResumeArgs {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     run: PathBuf,
-    /// Continue here instead of where the run began; digits then differ [default: where it began]
+    /// Continue here instead of where the run began; the last digits then differ [default: where it began]
     #[arg(long, value_name = "WHERE", value_parser = parsers::word::<BackendChoice>(), help_heading = MACHINE)]
     backend: Option<BackendChoice>,
     /// Continue on this GPU adapter, given by a part of its name [default: the one on which it began]
     #[arg(long, value_name = "NAME", help_heading = MACHINE)]
     adapter: Option<String>,
-    /// Threads that make and evaluate members and, on the CPU, advance them [default: as in the spec, otherwise all
+    /// Threads that prepare and analyse members and, on the CPU, advance them [default: as in the spec, otherwise all
     /// cores]
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<usize>, allow_hyphen_values = true, help_heading = MACHINE)]
     threads: Option<usize>,

@@ -26,12 +26,13 @@ Examples:
       an eighth of the members, for curvelax merge; the same line resumes it after an interruption
   curvelax run spec.toml --dry-run
 
-Distributions, for numbers in --shape, --flow, --amplitude and --decay; each member has a number of its own:
+Distributions, for any number in --shape, --flow, --energy, --diffusivity, --drive, --amplitude, --decay and
+--reduced-area; each member has a number of its own:
   uniform(A..B)  loguniform(A..B)  normal(MEAN,SD)  halfnormal(SD)  gamma(SHAPE,SCALE)  weibull(SHAPE,SCALE)
   lognormal(MEDIAN,SIGMA)             SIGMA is the standard deviation of the natural logarithm
   choice(A,B,...)  empirical(A,B,...)     one of these values; a number between two neighbours among them
   each(A,B,...)  table(FILE,COLUMN)       a value for each member, in their order
-  LAW in A..B                             one of the laws down to lognormal, cut at bounds
+  DISTRIBUTION in A..B                    one of the distributions down to lognormal, cut at bounds
 
 R in a default is the radius of the circle whose area is that of the member.
 The keys of SPEC.toml are the names of the flags; a flag overrides the file.";
@@ -58,7 +59,7 @@ pub struct RunArgs {
     #[command(flatten)]
     options: ReportFlags,
     /// Predict memory, disk space, steps and time of the run from a pilot of some two seconds of work, and stop. With
-    /// --accuracy its rounds come first, since they choose what is run
+    /// --accuracy the trial rounds, which choose what is run, are run first
     #[arg(long, conflicts_with = "print_spec", help_heading = flags::OUTPUT)]
     dry_run: bool,
     /// Print the resolved spec and stop

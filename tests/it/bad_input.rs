@@ -101,7 +101,7 @@ fn a_value_that_cannot_be_read_is_named_with_its_flag() {
         ("--backend", "cuda", "auto, gpu, cpu"),
         ("--precision", "f16", "f32, f64"),
         ("--event", "convex = kmin >= 0", "no observable `kmin` (did you mean `k_min`?)"),
-        ("--event", "convex", "write NAME = OBSERVABLE <= LEVEL"),
+        ("--event", "convex", "write NAME = OBSERVABLE <= THRESHOLD"),
         ("--event", "t_relax = excess <= 1", "choose another name"),
         ("--store", "zar", "similar value exists: 'zarr'"),
         ("--tables", "parqet", "similar value exists: 'parquet'"),

@@ -170,7 +170,7 @@ fn a_run_out_of_time_keeps_its_state() {
     // Then the state may be older than the table.
     let at_once = |message: &str| message.contains("error: stopped by SIGTERM at once");
     let kept = rows();
-    let told = format!("with {kept} of 100000000 members in the table; curvelax resume out continues\n");
+    let told = format!("; {kept} of 100000000 members finished; curvelax resume out continues\n");
     let mut is_exact = !at_once(&message);
     let says_so = message.contains("error: stopped by SIGTERM after ") && message.contains(&told);
     assert!(says_so || !is_exact, "{message}");
@@ -193,7 +193,7 @@ fn a_run_out_of_time_keeps_its_state() {
         let message = String::from_utf8(output.stderr).unwrap();
         assert!(rows() > before, "{message}");
         assert_eq!(output.status.code(), Some(75), "{message}");
-        let resuming = format!("resuming: {before} of 100000000 members are in the table\n");
+        let resuming = format!("resuming: {before} of 100000000 members finished\n");
         assert!(message.contains(&resuming) || !is_exact, "{message}");
         is_exact = !at_once(&message);
     }
@@ -224,9 +224,12 @@ fn a_dry_run_writes_nothing_and_its_table_says_what_its_json_says() {
         assert!(said[key].as_f64().is_some_and(|value| value > 0.0), "{key}: {said}");
     }
     let table = printed(home.path(), &format!("{study} --out out"));
-    for line in
-        ["members    46 in 2 cells\n", "steps      about 200 per member\n", "disk       about ", "time       about "]
-    {
+    for line in [
+        "the run has 46 members in 2 cells\n",
+        "takes about 200 on average\n",
+        "its files take about ",
+        "the run takes about ",
+    ] {
         assert!(table.contains(line), "{table}");
     }
     assert_eq!(names(home.path()), [""; 0]);
@@ -439,7 +442,7 @@ fn a_first_run_loads_no_driver_where_no_gpu_can_be() {
     let devices = fs::read_dir("/dev").into_iter().flatten().map(|entry| entry.unwrap().file_name());
     let has_nodes = devices.into_iter().any(|name| kinds.iter().any(|kind| name.to_string_lossy().starts_with(kind)));
     // A slow run prints how far it is.
-    let lines: Vec<&str> = said.lines().filter(|line| !line.contains(" of 3 members, ")).collect();
+    let lines: Vec<&str> = said.lines().filter(|line| !line.contains(" of 3 runs, ")).collect();
     assert!(has_nodes || lines == ["back end: CPU, f64 (no hardware GPU found); Gauss-Seidel sweeps"], "{said}");
 }
 
@@ -491,7 +494,10 @@ fn quiet_says_nothing_but_errors() {
     let warned = "--curves 2 --points 34 --adaptive=1e-2 --solver gauss-seidel --t-end 0.01";
     let loud = curvelax(home.path(), &format!("run {warned} --backend auto --out loud"));
     let said = String::from_utf8(loud.stderr).unwrap();
-    assert!(said.contains("back end: ") && said.contains("\nwarning: sweeps ") && !loud.stdout.is_empty(), "{said}");
+    assert!(
+        said.contains("back end: ") && said.contains("\nwarning: Gauss-Seidel ") && !loud.stdout.is_empty(),
+        "{said}"
+    );
     fs::remove_file(home.path().join("loud/plots/portraits.json")).unwrap();
     for arguments in [
         format!("run {warned} --backend auto --out run"),

@@ -83,7 +83,7 @@ fn an_impossible_distribution_is_one_clear_message_before_any_work() {
     for (arguments, parts) in [
         (
             "--shape ellipse:normal(1,0.5),1",
-            &["half-axis -", "for member ", " more of 256;", "cut it: LAW in A..B"][..],
+            &["half-axis -", "for member ", " more of 256;", "cut it: DISTRIBUTION in A..B"][..],
         ),
         ("--shape circle:uniform(-1..3)", &["the radius -", "for member "]),
         ("--shape circle:uniform(-3..1)", &["the radius -1 ", "at the medians of its distributions"]),

@@ -237,7 +237,7 @@ fn an_event_at_the_start_is_warned_of_and_one_that_does_not_happen_is_censored()
     }
     assert!(!said.contains("never"), "{said}");
     assert!(told.contains("event      never: none of 5 members reached it\n"), "{told}");
-    assert!(told.contains("event      soon: median 0 "), "{told}");
+    assert!(told.contains("event      soon: median 0, mean 0 "), "{told}");
 
     let done = Done { home };
     let (events, summary) = (done.rows("events.csv"), done.summary());

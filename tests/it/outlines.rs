@@ -383,7 +383,9 @@ fn the_overview_says_what_outlines_were_taken_as_and_the_dry_run_counts_their_ot
     };
     let told = line("");
     assert!(
-        told.starts_with("1 interpolated by a spline, 1 interpolated as a polygon; corners of 1 were rounded, which changed the area by"),
+        told.starts_with(
+            "1 interpolated by a spline, 1 interpolated as a polygon; corners of 1 were rounded: the area changed by"
+        ),
         "{told}"
     );
     assert_eq!(line("--interpolate polygon --rounding 0"), "2 interpolated as a polygon");

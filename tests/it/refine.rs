@@ -139,8 +139,11 @@ fn a_goal_is_reached_by_the_same_choice_whatever_the_shard() {
     let flags = "run --accurate --accuracy 0.01 --curves 32 --backend cpu";
     let (code, rounds) = curvelax(home.path(), &format!("{flags} --out whole"));
     assert_eq!(code, Some(0), "{rounds}");
-    assert!(rounds.contains("round 1: 32 members of n = 100") && rounds.contains("by discretisation"), "{rounds}");
-    assert!(rounds.contains(" by sampling") && !rounds.contains("n = 141"), "more nodes are not needed: {rounds}");
+    assert!(rounds.contains("round 1: 32 members at n = 100") && rounds.contains("by discretisation"), "{rounds}");
+    assert!(
+        rounds.contains(", by sampling alone") && !rounds.contains("n = 141"),
+        "more nodes are not needed: {rounds}"
+    );
     let ensemble = home.path().join("whole/ensemble.csv");
     let [median, low, high] = ["median", "median_low", "median_high"]
         .map(|name| field(&ensemble, &format!("t_limit_{name}")).parse::<f64>().unwrap());
@@ -244,7 +247,10 @@ fn a_run_whose_error_is_not_known_says_why() {
     let flags = "run --points 16 --modes 2..=4 --curves 2 --tau 0.01 --backend cpu --out out";
     let output = command::curvelax(home.path(), flags);
     let told = String::from_utf8_lossy(&output.stdout);
-    assert!(told.contains("discretisation not known: no member has times at n, n/√2 and n/2 nodes"), "{told}");
+    assert!(
+        told.contains("the error of discretisation is unknown: no member has times at n, n/√2 and n/2 nodes"),
+        "{told}"
+    );
     assert_eq!(fs::read_to_string(home.path().join("out/levels.csv")).unwrap().lines().count(), 1);
     assert_eq!(field(&home.path().join("out/ensemble.csv"), "discretisation_known"), "0");
 }

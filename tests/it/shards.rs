@@ -446,7 +446,7 @@ fn one_line_begins_a_run_continues_it_and_leaves_it() {
         &["--resume: the run in out has another spec: seed is 1 there and 2 here"],
     );
     let message = said(&stopped_after(home.path(), &line, "resuming: "), 75);
-    assert!(message.contains("resuming: 0 of 2 members are in the table"), "{message}");
+    assert!(message.contains("resuming: 0 of 2 members finished"), "{message}");
     let short = format!("run {SMALL} --resume --out short");
     // A folder in which nothing was begun is not in the way.
     fs::create_dir(home.path().join("short")).unwrap();

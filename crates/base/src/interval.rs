@@ -26,12 +26,18 @@ impl Interval {
         self.lower.zip(self.upper)
     }
 
-    /// `95 % interval 0.401 to 0.42`, `95 % interval 0.401 or more`, `range of 4, 0.401 to 0.42, covers 87.5 %`.
+    /// `95 % interval 0.401 to 0.42`, `95 % interval 0.401 or more`, `range of all 4, 0.401 to 0.42,
+    /// which contains the median with probability 87.5 %`.
     pub fn in_words(&self, shown: impl Fn(f64) -> String) -> String {
         let ends = self.ends(shown);
         match self.range_of {
             None => format!("95 % interval {ends}"),
-            Some(values) => format!("range of {values}, {ends}, covers {} %", self.percent()),
+            Some(values) => {
+                format!(
+                    "range of all {values}, {ends}, which contains the median with probability {} %",
+                    self.percent()
+                )
+            }
         }
     }
 
@@ -71,6 +77,7 @@ mod tests {
         assert_eq!((open.bounds(), told(open)[1].as_str()), (None, "95 %: 0.5 or more"));
         assert_eq!(told(Interval { lower: None, ..closed })[0], "95 % interval 0.75 or less");
         let range = Interval { coverage: 0.875, range_of: Some(4), ..closed };
-        assert_eq!(told(range), ["range of 4, 0.5 to 0.75, covers 87.5 %", "range of 4, covers 87.5 %: 0.5 to 0.75"]);
+        let words = "range of all 4, 0.5 to 0.75, which contains the median with probability 87.5 %";
+        assert_eq!(told(range), [words, "range of 4, covers 87.5 %: 0.5 to 0.75"]);
     }
 }

@@ -23,12 +23,12 @@ columns! { Outcome, names::SUMMARY:
     member: whole = member, "index of the member, from 0";
     cell: whole = cell, "index of its cell, from 0";
     status: status = status, "how the member ended";
-    t_end: time = t_end, "time of the last accepted state";
+    t_end: time = t_end, "time of the member's last state, at most the final time";
     steps: whole = steps, "accepted steps";
     rejected: whole = rejected, "adaptive steps that were refused";
-    sweeps_k: whole = sweeps_k, "sweeps on the curvature systems, 0 with the direct solver";
-    sweeps_x: whole = sweeps_x, "sweeps on the position systems";
-    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` the time from which on the energy stays within this share of the largest distance that it had from its end, empty if it comes back near it";
+    sweeps_k: whole = sweeps_k, "Gauss-Seidel sweeps on the curvature systems, 0 with the direct solver";
+    sweeps_x: whole = sweeps_x, "Gauss-Seidel sweeps on the position systems";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` the time after which |E - E_end| stays below `relax-to` times its maximum over the run, empty if E returns close to this threshold";
     t_half: event = t_half, "first time at which the excess reaches half its start; with `--conserve area,length` likewise by the energy";
     rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
     rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
@@ -44,26 +44,26 @@ columns! { Outcome, names::SUMMARY:
     k_max: number = end.k_max, "largest curvature of the last state";
     turning: signed = end.turning, "turning number of the last polygon";
     mesh_ratio: number = end.mesh_ratio, "longest over shortest edge of the last polygon";
-    metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: how far the scheme's own lengths have left those of the polygon";
+    metric_drift: number = end.metric_drift, "max |r_i - |e_i||/|e_i| of the last state: largest relative difference between the segment lengths r that the scheme evolves and those of the polygon";
     self_crossing: event = self_crossing, "time at which the polygon was first seen to cross itself, which does not stop the member";
     solves: whole = solves, "steps of the scheme that were computed, each a solve for k and one for x and y: 1 for a fixed step, 1 + 2 + … + J for an adaptive one of order J, also if it was refused";
     t_limit: event = t_limit, "with `--refine`: t_relax in the limit of many nodes and short steps";
-    t_error: optional = t_error, "half-width of the 95 % interval of t_limit; of an outline with by how much the time moves with corners rounded to twice the radius";
+    t_error: optional = t_error, "half-width of the 95 % interval of t_limit; for outlines it includes the change of the time when the corner radius is doubled";
     order: optional = order, "observed order of t_relax in 1/n, 2 for a smooth curve; empty where differences do not fall";
     label: word = label, "name of its outline; empty if it has none";
     group: word = group, "value of the property `--group-by` of its outline";
     points: whole = points, "nodes of the finest level that t_limit, or else t_vanish_limit, rests on; without both those of the member";
-    t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 points or more: by how much the time moves at these nodes with every second point of the outline";
+    t_data_error: optional = t_data_error, "with `--refine`, of outlines of 12 data points or more: change of the time, at `points` nodes, when every second data point is left out";
     wulff_distance: optional = wulff_distance, "of a crystal: largest error of the support function of the last polygon, centred, against the Wulff shape of its area, as a length";
     t_vanish: event = t_vanish, "time at which a driving force has shrunk it to a point: it is followed to a tenth of its length (a crystal until it is at rest, at the latest to a quarter), and the rest is that of a circle; t_end is then a little earlier";
     reduced_area: optional = reduced_area, "with `--conserve`: 4πA/L² of the last polygon";
     t_vanish_limit: event = t_vanish_limit, "with `--refine`: t_vanish in the limit of many nodes and short steps; empty where the last excess is above 10⁻³, since the rest of its life is not that of a circle";
-    t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit; of an outline with what rounding does, as in t_error";
+    t_vanish_error: optional = t_vanish_error, "half-width of the 95 % interval of t_vanish_limit; for outlines as in t_error";
 }
 
 columns! { LevelRow, names::LEVELS:
     member: whole = member, "index of the member";
-    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes; of outlines 100 more, on its finest one: with every second point, and 200 more: with corners rounded to twice the radius";
+    level: whole = level, "1: n/2 nodes; 2: n/√2; 3: n; with `--refine`, of members that need more, 4: √2 n; 5: 2n; and so on up to 1600 nodes; of outlines 100 more, on its finest one: with every second data point, and 200 more: with twice the corner radius";
     cell: whole = cell, "index of its cell";
     points: whole = points, "nodes";
     adaptive: optional = adaptive, "tolerance of the steps: a tenth of that of the run, 1e-4 with fixed steps";
@@ -86,7 +86,7 @@ row! {
     cell: whole, "index of its cell";
     rate: optional, "as in `summary.csv`";
     rate_r2: optional, "as in `summary.csv`";
-    rate_theory: optional, "rate of the slowest mode by linear theory, 24/R⁴ for mode 2 and surface diffusion, for elastic flow at the radius while the rate is fitted; empty where there is none";
+    rate_theory: optional, "decay rate of the excess by linear theory of the slowest mode, twice that of its amplitude: 24/R⁴ for mode 2 and surface diffusion; for elastic flow at the radius while the rate is fitted; empty where there is none";
     rate_ratio: optional, "rate / rate_theory";
 }
 
@@ -143,9 +143,9 @@ columns! { MeanExcess, names::MEAN_EXCESS:
     members: whole = members, "members of the cell that reached t";
     mean: optional = mean, "their mean excess";
     sd: optional = sd, "its standard deviation";
-    q05: optional = q05, "its 5 % quantile, to 1 %";
-    median: optional = median, "its median, to 1 %";
-    q95: optional = q95, "its 95 % quantile, to 1 %";
+    q05: optional = q05, "its 5 % quantile, rounded to 1 %";
+    median: optional = median, "its median, rounded to 1 %";
+    q95: optional = q95, "its 95 % quantile, rounded to 1 %";
 }
 
 columns! { ExplainedRow, names::EXPLAINED:

@@ -238,7 +238,7 @@ impl FromStr for Diffusivity {
         match least > 0.0 {
             true => Ok(diffusivity),
             false => Err(format!(
-                "the mobility 1 + MU cos M(psi - DEG) falls to {}, and atoms would run uphill; use a MU below 1",
+                "the mobility 1 + EPS cos M(psi - DEG) falls to {}, and atoms would run uphill; use an EPS below 1",
                 number((1e4 * least).round() / 1e4)
             )),
         }

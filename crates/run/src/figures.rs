@@ -215,7 +215,7 @@ impl Sink for Only {
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
-        self.progress.show(done, total, share);
+        self.progress.show(done, total, share, "member");
         Ok(())
     }
 }

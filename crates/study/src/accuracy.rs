@@ -87,15 +87,17 @@ impl fmt::Display for Round {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let Round { number, points, tolerance, found, .. } = self;
         let tolerance = tolerance.map_or(String::new(), |tolerance| format!(", tolerance {}", rounded(tolerance, 2)));
-        write!(f, "round {number}: {} of n = {points}{tolerance}: ", count(self.members, "member"))?;
+        write!(f, "round {number}: {} at n = {points}{tolerance}: ", count(self.members, "member"))?;
         let Some(Uncertainty { of, all, discretisation }) = *found else {
-            return write!(f, "no interval is known");
+            return write!(f, "the median has no interval");
         };
         let (all, discretisation) = (rounded(all, 2), rounded(discretisation, 2));
         match of {
-            Uncertain::Each => write!(f, "relative error of each {all}"),
-            Uncertain::Median => write!(f, "relative uncertainty {all}, {discretisation} of it by discretisation"),
-            Uncertain::Sampled => write!(f, "relative uncertainty {all} by sampling"),
+            Uncertain::Each => write!(f, "the relative error of each time is {all}"),
+            Uncertain::Median => {
+                write!(f, "the relative uncertainty of the median is {all}, {discretisation} of it by discretisation")
+            }
+            Uncertain::Sampled => write!(f, "the relative uncertainty of the median is {all}, by sampling alone"),
         }
     }
 }

@@ -646,7 +646,7 @@ class Package(unittest.TestCase):
             curvelax.run(**{**SMALL, "progress": True, "curves": 2000})
             curvelax.run(**{**SMALL, "progress": None, "curves": 2000})
         lines = shown.getvalue().split("\r")
-        self.assertRegex(lines[1], r"^ *\d+ % \d+ of 2000 members$")
+        self.assertRegex(lines[1], r"^ *\d+ % \d+ of 2000 runs$")
         self.assertEqual((lines[-2].strip(), lines[-1]), ("", ""))
         self.assertNotIn("\n", shown.getvalue())
 
@@ -668,7 +668,7 @@ class Package(unittest.TestCase):
             curvelax.run(**{**keys, "progress": interrupt}, out=out)
         self.assertIsInstance(caught.exception, curvelax.Interrupted)
         self.assertEqual(caught.exception.folder, out)
-        self.assertRegex(str(caught.exception), r"stopped by Ctrl-C after .* of 2000 members in the table; curvelax\.resume\('")
+        self.assertRegex(str(caught.exception), r"stopped by Ctrl-C after .* of 2000 members finished; curvelax\.resume\('")
         # The interpreter lives, and so does its own Ctrl-C.
         with self.assertRaises(KeyboardInterrupt):
             os.kill(os.getpid(), signal.SIGINT)

@@ -16,9 +16,9 @@
 //! | `each(a,b,...)` | the same, but member j has value j |
 //! | `empirical(a,b,...)` | between the two values, in ascending order, with ranks around u count - 1/2 |
 //!
-//! `LAW in a..b` is the continuous law under the condition that the number lies there: its quantile at F(a) + u (F(b) -
-//! F(a)), F the share of the law below a number. `table(FILE,COLUMN)` is `each` of a column of a file; it is read once,
-//! so that a run can be repeated without the file.
+//! `DISTRIBUTION in a..b` is the continuous law under the condition that the number lies there: its quantile at F(a) +
+//! u (F(b) - F(a)), F the share of the law below a number. `table(FILE,COLUMN)` is `each` of a column of a file; it is
+//! read once, so that a run can be repeated without the file.
 //!
 //! z(u) is the [quantile of the standard normal law](super::normal_quantile).
 
@@ -52,7 +52,7 @@ pub const NAMES: [&str; 11] = [
 /// What each needs.
 const USAGE: &str = "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), halfnormal(SD), \
                      gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), each(A,B,...), empirical(A,B,...), \
-                     table(FILE,COLUMN); continuous ones also as LAW in A..B";
+                     table(FILE,COLUMN); continuous ones also as DISTRIBUTION in A..B";
 
 /// The law of one number.
 #[derive(Clone, Debug, PartialEq)]
@@ -208,11 +208,12 @@ impl Distribution {
     /// # Errors
     /// A message for a law of single values, for no range, and for one that the law hardly reaches.
     pub fn within(self, range: &str) -> Result<Distribution, String> {
-        let wrong = |problem: &str| format!("{self} in {}: {problem}; write LAW in A..B with A < B", echo(range));
+        let wrong =
+            |problem: &str| format!("{self} in {}: {problem}; write DISTRIBUTION in A..B with A < B", echo(range));
         let end = |word: &str| word.trim().parse::<f64>().ok().filter(|end| end.is_finite());
         let ends = range.split_once("..").and_then(|(low, high)| Some((end(low)?, end(high)?)));
         if range.trim().is_empty() {
-            return Err(format!("{self} in: no range; write LAW in A..B with A < B"));
+            return Err(format!("{self} in: no range; write DISTRIBUTION in A..B with A < B"));
         }
         if range.contains(" in ") {
             return Err(wrong("a law is cut once"));
@@ -480,9 +481,9 @@ mod tests {
             ("weibull(1,-2)", "the scale must be above 0; write weibull(SHAPE,SCALE)"),
             ("halfnormal(0)", "not a number above 0; write halfnormal(SD)"),
             ("empirical(1,1)", "fewer than two different numbers"),
-            ("normal(0,1) in 2..1", "the range is empty; write LAW in A..B"),
-            ("normal(0,1) in ", "normal(0,1) in: no range; write LAW in A..B"),
-            ("normal(0,1) in 2", "not a range of finite numbers; write LAW in A..B"),
+            ("normal(0,1) in 2..1", "the range is empty; write DISTRIBUTION in A..B"),
+            ("normal(0,1) in ", "normal(0,1) in: no range; write DISTRIBUTION in A..B"),
+            ("normal(0,1) in 2", "not a range of finite numbers; write DISTRIBUTION in A..B"),
             ("normal(0,1) in 9..10", "next to no numbers there"),
             ("choice(1,2) in 0..3", "only a continuous law can be cut"),
             ("normal(0,1) in 0..3 in 0..2", "only a continuous law can be cut"),

@@ -392,9 +392,9 @@ mod tests {
         assert!(shape("circle:normal(1,0.17)").refusal().is_some());
         assert!("ellipse:normal(1,0.5) in 0.1..3,1".parse::<Drawn<Shape>>().is_ok());
         for text in ["ellipse:normal(1,0.5) in 0.1,1", "ellipse:normal(1,0.5) in 0..1..2,1"] {
-            assert!(refusal(text).contains("not a range of finite numbers; write LAW in A..B"), "{text}");
+            assert!(refusal(text).contains("not a range of finite numbers; write DISTRIBUTION in A..B"), "{text}");
         }
-        assert!(refusal("ellipse:normal(1,0.5) in").contains("no range; write LAW in A..B"));
+        assert!(refusal("ellipse:normal(1,0.5) in").contains("no range; write DISTRIBUTION in A..B"));
         for text in
             ["circle:normal(1,0.2)in 0.1..3", "circle:normal (1,0.2)  IN 0.1..3 ", "circle: normal(1,0.2) in 0.1..3"]
         {

@@ -1,7 +1,7 @@
-//! Events of one's own: the first time at which an observable of a member reaches a level.
+//! Events of one's own: the first time at which an observable of a member reaches a threshold.
 //!
-//! An event is written `NAME = OBSERVABLE <= LEVEL` or `… >= LEVEL`. The level is a number in the user's units, or a
-//! multiple of the observable at the member's start, `FACTOR * start`.
+//! An event is written `NAME = OBSERVABLE <= THRESHOLD` or `… >= THRESHOLD`. The threshold is a number in the user's
+//! units, or a multiple of the observable at the member's start, `FACTOR * start`.
 
 use std::{fmt, str::FromStr};
 
@@ -22,8 +22,8 @@ const SHOWN: usize = 40;
 /// Times that every member has, and words that readers of tables take for a missing value.
 const RESERVED: [&str; 5] = ["t_relax", "t_half", "t_limit", "t_end", "self_crossing"];
 const MISSING: [&str; 6] = ["na", "nan", "nil", "none", "null", "inf"];
-const USAGE: &str = "write NAME = OBSERVABLE <= LEVEL or >= LEVEL, such as convex = k_min >= 0, or with a level relative \
-                     to the start, slow = excess <= 0.5 * start";
+const USAGE: &str = "write NAME = OBSERVABLE <= THRESHOLD or >= THRESHOLD, such as convex = k_min >= 0, or with a \
+                     threshold relative to the start, slow = excess <= 0.5 * start";
 
 /// A scalar of a curve, by its name in `series.csv`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,15 +46,15 @@ pub enum Observable {
     MetricDrift,
 }
 
-/// A level of an observable, and from which side it is reached.
+/// A threshold of an observable, and from which side it is reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Condition {
     /// The observable.
     pub observable: Observable,
     /// Whether the condition is `<=`; otherwise it is `>=`.
     pub falls: bool,
-    /// The level in the user's units, or as a multiple of the start.
-    pub level: f64,
+    /// The threshold in the user's units, or as a multiple of the start.
+    pub threshold: f64,
     /// Whether it is a multiple of the start.
     pub relative: bool,
 }
@@ -136,11 +136,11 @@ impl FromStr for Observable {
 }
 
 impl Condition {
-    /// The level in lengths of `unit`, for a member that starts with the observables `start` in that unit.
-    pub fn level_in(&self, unit: f64, start: &Observed<f64>) -> f64 {
+    /// The threshold in lengths of `unit`, for a member that starts with the observables `start` in that unit.
+    pub fn threshold_in(&self, unit: f64, start: &Observed<f64>) -> f64 {
         match self.relative {
-            true => self.level * self.observable.of(start),
-            false => self.level / unit.powi(self.observable.power()),
+            true => self.threshold * self.observable.of(start),
+            false => self.threshold / unit.powi(self.observable.power()),
         }
     }
 }
@@ -150,9 +150,10 @@ impl FromStr for Condition {
 
     fn from_str(text: &str) -> Result<Condition, String> {
         let text = text.trim();
-        let at = text.find(['<', '>']).ok_or_else(|| format!("`{}` has no level; {USAGE}", shortened(text, SHOWN)))?;
+        let at =
+            text.find(['<', '>']).ok_or_else(|| format!("`{}` has no threshold; {USAGE}", shortened(text, SHOWN)))?;
         let (left, falls) = (&text[..at], text[at..].starts_with('<'));
-        // A level is reached or not: `<` and `<=` have the same first time.
+        // A threshold is reached or not: `<` and `<=` have the same first time.
         let right = text[at + 1..].strip_prefix('=').unwrap_or(&text[at + 1..]);
         let observable = left.trim().parse()?;
         let (factor, relative) = match right.trim().strip_suffix("start") {
@@ -160,22 +161,22 @@ impl FromStr for Condition {
             Some(factor) => (factor.trim().strip_suffix('*').unwrap_or("").trim(), true),
             None => (right.trim(), false),
         };
-        let level = factor.parse().ok().filter(|level: &f64| level.is_finite());
-        let level = level.ok_or_else(|| {
+        let threshold = factor.parse().ok().filter(|threshold: &f64| threshold.is_finite());
+        let threshold = threshold.ok_or_else(|| {
             format!(
-                "`{}` is not a level, which is a number or a number * start; {USAGE}",
+                "`{}` is not a threshold, which is a number or a number * start; {USAGE}",
                 shortened(right.trim(), SHOWN)
             )
         })?;
-        Ok(Condition { observable, falls, level, relative })
+        Ok(Condition { observable, falls, threshold, relative })
     }
 }
 
 impl fmt::Display for Condition {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Condition { observable, falls, level, relative } = self;
+        let Condition { observable, falls, threshold, relative } = self;
         let (sign, start) = (if *falls { "<=" } else { ">=" }, if *relative { " * start" } else { "" });
-        write!(f, "{} {sign} {}{start}", observable.name(), number(*level))
+        write!(f, "{} {sign} {}{start}", observable.name(), number(*threshold))
     }
 }
 
@@ -237,18 +238,18 @@ mod tests {
     #[test]
     fn what_is_no_event_is_refused_with_the_remedy() {
         for (text, part) in [
-            ("convex", "`convex` has no name; write NAME = OBSERVABLE <= LEVEL"),
+            ("convex", "`convex` has no name; write NAME = OBSERVABLE <= THRESHOLD"),
             ("k_min >= 0", "`k_min >= 0` has no name"),
-            ("convex = k_min", "`k_min` has no level"),
-            ("convex = k_min = 0", "has no level"),
+            ("convex = k_min", "`k_min` has no threshold"),
+            ("convex = k_min = 0", "has no threshold"),
             ("convex = kmin >= 0", "no observable `kmin` (did you mean `k_min`?); use one of length, area, excess"),
             ("convex = >= 0", "no observable ``; use one of"),
-            ("convex = k_min >=", "`` is not a level"),
-            ("convex = k_min >= none", "`none` is not a level"),
-            ("convex = k_min >= nan", "`nan` is not a level"),
-            ("convex = k_min >= inf * start", "is not a level"),
-            ("convex = k_min >= 2 start", "is not a level"),
-            ("convex = k_min >= restart", "is not a level"),
+            ("convex = k_min >=", "`` is not a threshold"),
+            ("convex = k_min >= none", "`none` is not a threshold"),
+            ("convex = k_min >= nan", "`nan` is not a threshold"),
+            ("convex = k_min >= inf * start", "is not a threshold"),
+            ("convex = k_min >= 2 start", "is not a threshold"),
+            ("convex = k_min >= restart", "is not a threshold"),
             ("t_half = excess <= 1", "`t_half` is a time that every member has"),
             ("NaN = excess <= 1", "reads as a missing value"),
             (" = excess <= 1", "`` is not a name"),
@@ -272,11 +273,11 @@ mod tests {
         let unit = 4.0;
         let user = crate::Observables::new(&at, 1.0, unit);
         let user = [user.length, user.area, user.excess, user.energy, user.k_min, user.k_max, user.mesh_ratio];
-        for (observable, level) in Observable::ALL.into_iter().zip(user) {
-            let condition = Condition { observable, falls: true, level, relative: false };
-            assert_eq!(condition.level_in(unit, &at), observable.of(&at), "{condition}");
-            let relative = Condition { level: 0.5, relative: true, ..condition };
-            assert_eq!(relative.level_in(unit, &at), 0.5 * observable.of(&at));
+        for (observable, threshold) in Observable::ALL.into_iter().zip(user) {
+            let condition = Condition { observable, falls: true, threshold, relative: false };
+            assert_eq!(condition.threshold_in(unit, &at), observable.of(&at), "{condition}");
+            let relative = Condition { threshold: 0.5, relative: true, ..condition };
+            assert_eq!(relative.threshold_in(unit, &at), 0.5 * observable.of(&at));
         }
     }
 }

@@ -144,10 +144,10 @@ keys! {
     #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
     #[allow(rustdoc::broken_intra_doc_links)] // the brackets of a grammar
     pub struct Spec {
-        /// Number of members. For outlines, the number of copies of each, perturbed by --amplitude; without the flag,
-        /// several outlines, or files:PATTERN, run once each, unperturbed [default: 256]
+        /// Number of members: perturbed copies of the curve, or of each outline. Without the flag, several outlines, or
+        /// those of files:PATTERN, are one unperturbed member each [default: 256]
         curves: u64 = 256, "COUNT", ENSEMBLE;
-        /// Expected number of outlines: another number is refused. The spec of a run records it [default: any number]
+        /// Fail unless exactly this many outlines are read. The spec of a run records it [default: any number]
         outlines?: u64, "COUNT", ENSEMBLE;
         /// Compare the outlines by the values of this property of their features, column of their table, or `file`
         /// [default: no groups]
@@ -158,14 +158,15 @@ keys! {
         #[serde(with = "seed")]
         seed: u64 = 1, "SEED", ENSEMBLE;
         /// Initial curve: ellipse:A,B, circle:R, nonconvex, astroid, lemniscate:A or flower:M:A[:PHASE],...; or the
-        /// outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy), each of which is a member. Paths are
-        /// relative to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below
+        /// outlines in file:PATH or 'files:PATTERN' (CSV, GeoJSON, WKT, NumPy). A single outline of file: becomes
+        /// --curves perturbed copies; several, or those of files:, are one unperturbed member each. Paths are relative
+        /// to the current folder. Any number may be a distribution, such as uniform(1.2..3): see below
         /// [default: ellipse:2,1]
         shape: Drawn<Shape> = Shape::Ellipse { a: 2.0, b: 1.0 }.into(), "SHAPE", ENSEMBLE;
         /// Placement of the nodes on the curve [default: arclength]
         sampling: Sampling = Sampling::Arclength, "HOW", ENSEMBLE;
-        /// How the curve of an outline runs between its points: as a polygon, as a cubic spline, or (auto) as a spline
-        /// with corners where the direction turns by more than half a radian [default: auto]
+        /// How the curve of an outline runs between its data points: as a polygon, as a cubic spline, or (auto) as a
+        /// spline with corners where the direction turns by more than half a radian [default: auto]
         interpolate?: Interpolation, "HOW", ENSEMBLE;
         /// Smallest radius of curvature of an outline's corners, as a share of the outline's length, 0.0001 to 0.02; 0
         /// leaves them to the nodes [default: 0.002]
@@ -179,10 +180,10 @@ keys! {
         /// Stretch the curve of each member along its principal axes, at the same area, to the reduced area V = 4 pi
         /// A/L^2, 0.05 to 1; or a distribution. Needs --conserve area,length [default: as it is]
         reduced_area?: Drawn<f64>, "V", ENSEMBLE;
-        /// Law of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal coefficients of
-        /// cos and sin with the same power [default: amplitude-phase]
+        /// Distribution of each mode: a normal amplitude and a uniform phase, or (gaussian) independent normal
+        /// coefficients of cos and sin with the same power [default: amplitude-phase]
         #[serde(skip_serializing_if = "Perturbation::is_default")]
-        perturbation: Perturbation = Perturbation::default(), "LAW", ENSEMBLE;
+        perturbation: Perturbation = Perturbation::default(), "HOW", ENSEMBLE;
         /// How the members of a cell are spread over the distributions of --shape, --flow, --energy, --diffusivity,
         /// --drive, --amplitude, --decay and --reduced-area: each on its own, as a scrambled Sobol sequence, or as a
         /// Latin hypercube. The modes of the perturbation stay random [default: random]
@@ -191,20 +192,20 @@ keys! {
         /// Flow: surface-diffusion, willmore, elastic:LAMBDA or poly:C1,C2,...; numbers may be distributions
         /// [default: surface-diffusion]
         flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", EVOLUTION;
-        /// Surface energy γ of a crystal under surface diffusion, by the angle ψ of the outward normal: cos:M,EPS[,DEG]
-        /// is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below 1. Any
-        /// number may be a distribution. --energy 1 is isotropic, but in the geometric form [default: 1]
+        /// Surface energy γ of a crystal (anisotropic) under surface diffusion, by the angle ψ of the outward normal:
+        /// cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1)
+        /// below 1. Any number may be a distribution. --energy 1 is isotropic, but in the geometric form [default: 1]
         energy?: Drawn<Energy>, "GAMMA", EVOLUTION;
-        /// Mobility of the atoms along the surface of a crystal, by the same angle: cos:M,MU[,DEG] is 1 + MU cos M(ψ -
-        /// DEG), above 0 in all directions; a sum of two as for --energy [default: 1]
+        /// Mobility of the atoms along the surface of a crystal: cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG), above 0 in
+        /// all directions; a sum of two as for --energy. Any number may be a distribution [default: 1]
         diffusivity?: Drawn<Diffusivity>, "M", EVOLUTION;
         /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
         /// diffusion has R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any
         /// number may be a distribution [default: 0]
         drive?: Drawn<Drive>, "F", EVOLUTION;
         /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-        /// vesicle: it is relaxed when its energy stays within --relax-to of its largest distance from its end
-        /// [default: neither]
+        /// vesicle: it is relaxed from the time after which |E - E_end| stays below --relax-to times its maximum over
+        /// the run [default: neither]
         conserve?: Conserved, "WHAT", EVOLUTION;
         /// The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are
         /// scaled to it, and for both first stretched as by --reduced-area [default: those of the polygon at the start]
@@ -232,9 +233,10 @@ keys! {
         /// Rate κ, in 1/time, at which the curvatures k and segment lengths r that the scheme evolves relax to those of
         /// the polygon. 0 is the paper's scheme; auto is 4 x 24/R^4 for each member [default: 0]
         pull: OrAuto = OrAuto::Number(0.0), "KAPPA", METHOD;
-        /// What moves the nodes. paper: the curvatures and segment lengths that the scheme evolves; geometric: the
-        /// force of the polygon itself, which halves the error of smooth, well resolved curves and fails for others;
-        /// auto: paper [default: paper; geometric with --energy, --diffusivity, --drive and --conserve]
+        /// Which discretisation moves the nodes. paper: that of the curvatures and segment lengths that the scheme
+        /// evolves; geometric: the force of the polygon itself, which halves the error of smooth, well resolved curves
+        /// and fails for others; auto: the default [default: paper; geometric with --energy, --diffusivity, --drive and
+        /// --conserve]
         form?: PositionForm, "FORM", METHOD;
         /// Solver of the pentadiagonal systems. auto is gauss-seidel with --tau and direct with --adaptive [default:
         /// auto]
@@ -265,10 +267,10 @@ keys! {
         /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there. Vesicles (--conserve
         /// area,length) run to the final time [default: false; with --t-end auto true]
         stop_when_relaxed?: bool, "BOOL", EVOLUTION;
-        /// Run every member also with n/2, n/√2 and n nodes and steps ten times as exact, and extrapolate t_relax to n
-        /// → ∞: columns t_limit, t_error, order and points of summary.csv; with --drive t_vanish, too: t_vanish_limit
-        /// and t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to 1600 nodes
-        /// [default: false]
+        /// Run every member also with n/2, n/√2 and n nodes and a tenth of the step tolerance, and extrapolate t_relax
+        /// to n → ∞: columns t_limit, t_error, order and points of summary.csv; with --drive t_vanish, too:
+        /// t_vanish_limit and t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to
+        /// 1600 nodes [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         refine: bool = false, "BOOL", EVOLUTION;
         /// With --refine or --accurate: choose n, the tolerance and the number of members so that the 95 % interval of
@@ -277,11 +279,11 @@ keys! {
         /// --curves, --points and --adaptive. If X cannot be reached, the run keeps its best result and exits with code
         /// 3 [default: off]
         accuracy?: f64, "X", EVOLUTION;
-        /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=LEVEL or >=LEVEL.
-        /// A level is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max, mesh_ratio
-        /// (longest over shortest segment) and metric_drift (how far r has drifted from the lengths of the segments).
-        /// For several events give it several times: --event 'convex = k_min >= 0' --event 'slow = excess <= 0.5 *
-        /// start' [default: none]
+        /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=THRESHOLD, or with
+        /// >=. A threshold is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max,
+        /// mesh_ratio (longest over shortest segment) and metric_drift (largest relative difference between the lengths
+        /// r that the scheme evolves and those of the segments). For several events give it several times: --event
+        /// 'convex = k_min >= 0' --event 'slow = excess <= 0.5 * start' [default: none]
         #[serde(skip_serializing_if = "Vec::is_empty")]
         event: Vec<Event> = Vec::new(), "NAME=CONDITION", OUTPUT;
         /// Write series.csv: one row per member every DT [default: off]
@@ -301,14 +303,14 @@ keys! {
         /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array
         /// [default: all]
         shard?: Shard, "I/N", ENSEMBLE;
-        /// Threads that make and evaluate members and, on the CPU, advance them [default: all cores]
+        /// Threads that prepare and analyse members and, on the CPU, advance them [default: all cores]
         threads?: usize, "COUNT", MACHINE;
         /// Draw member j of every cell from the same random numbers [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
         common_random_numbers: bool = false, "BOOL", ENSEMBLE;
-        /// Vary this key: a cell of members for each value, and for each combination if the flag is given for several
-        /// keys. Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1' [default:
-        /// none]
+        /// Vary this key: a cell of members for each value, or for each combination of values if the flag is given for
+        /// several keys. Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1'
+        /// [default: none]
         #[serde(skip_serializing_if = "Sweep::is_empty")]
         sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", ENSEMBLE;
     }

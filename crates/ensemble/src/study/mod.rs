@@ -278,8 +278,8 @@ pub(crate) fn cell_of<'a>(cells: &'a [Cell], ended: &Outcome) -> Option<&'a Cell
     cells.binary_search_by_key(&ended.cell, |cell| cell.index).ok().map(|at| &cells[at])
 }
 
-const LONG_SWEEPS: &str = "sweeps need more iterations the longer the step, and adaptive steps grow: a solve \
-                           may need tens of thousands; --solver direct needs none";
+const LONG_SWEEPS: &str = "Gauss-Seidel needs more sweeps the longer the step, and adaptive steps grow: a solve may \
+                           need tens of thousands; --solver direct needs none";
 
 const TOO_WIDE: &str = "standard errors and intervals are those of independent members, too wide for --design sobol and \
                         lhs: the spread over several seeds is the error of such a run";
@@ -287,7 +287,7 @@ const TOO_WIDE: &str = "standard errors and intervals are those of independent m
 const OF_THESE: &str = "standard errors and intervals take copies of one outline for independent members: they hold for these \
                         outlines, not for a population of which they are a sample";
 
-const NARROW: &str = "narrow the distribution, or cut it: LAW in A..B";
+const NARROW: &str = "narrow the distribution, or cut it: DISTRIBUTION in A..B";
 
 /// Members that are stretched before the run, to refuse what cannot be: each takes a millisecond.
 const STRETCHED: usize = 256;

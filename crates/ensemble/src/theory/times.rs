@@ -101,8 +101,8 @@ fn strong_crystal(spec: &Spec) -> Option<String> {
     let anisotropy = energy.typical().anisotropy();
     (anisotropy > PROVED_ANISOTROPY).then(|| {
         format!(
-            "--energy {energy}: the stiffness of the surface falls to {} of its mean; below {} the method was not shown to \
-             converge (docs/method.md)",
+            "--energy {energy}: the surface stiffness γ + γ″ falls to {} of its mean; below {} convergence was not tested \
+             (docs/method.md)",
             short(1.0 - anisotropy),
             short(1.0 - PROVED_ANISOTROPY)
         )

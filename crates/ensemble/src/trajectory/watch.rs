@@ -52,7 +52,7 @@ impl Watch {
     ) -> Vec<Watch> {
         let watch = |Event { condition, .. }: &Event| {
             let Condition { observable, falls, .. } = *condition;
-            let level = precision.rounded(condition.level_in(unit, start));
+            let level = precision.rounded(condition.threshold_in(unit, start));
             let is_excess = observable == Observable::Excess;
             // As for t_half: the excess of a regular polygon is rounding.
             let is_round = is_excess && falls && start.excess <= ROUND;

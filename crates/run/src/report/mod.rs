@@ -264,7 +264,7 @@ impl RunReport {
     fn so_far(&self) -> String {
         let (rows, all) = (self.tally.members(), plural(self.members, "member"));
         format!(
-            " after {} with {rows} of {} {all} in the table; curvelax resume {} continues",
+            " after {}; {rows} of {} {all} finished; curvelax resume {} continues",
             duration(self.wall().as_secs_f64()),
             self.members,
             quoted(self.folder.path()),
@@ -330,7 +330,7 @@ impl Sink for RunReport {
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
         let (before, all) = (self.before(), self.stages.iter().sum::<u64>());
         let share = (before as f64 + share * total as f64) / all.max(1) as f64;
-        self.progress.show(before + done, all, share);
+        self.progress.show(before + done, all, share, if all == self.members { "member" } else { "run" });
         match self.stop.asked() {
             Some((cause, when)) if when.elapsed() > self.patience => Err(cause.error(&self.so_far())),
             _ => Ok(()),
@@ -501,7 +501,7 @@ mod tests {
         let SinkRequest::Stop(error) = running.next_request() else { panic!("it continues") };
         assert_eq!(error.exit_code(), 75, "the first cause counts");
         assert!(error.to_string().starts_with("stopped by --max-time after "), "{error}");
-        assert!(error.to_string().contains("with 1 of 256 members in the table; curvelax resume "), "{error}");
+        assert!(error.to_string().contains("; 1 of 256 members finished; curvelax resume "), "{error}");
         // If this thread had to wait long, its patience may be over.
         let continues = running.progress(1, 256, 0.1).is_ok();
         assert!((continues || before.elapsed() > PATIENCE) && !stop.is_kept());

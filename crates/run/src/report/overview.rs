@@ -8,7 +8,7 @@ use super::words::{
 };
 use curvelax_base::{
     error::shortened,
-    text::{duration, number, plural, rounded_beside},
+    text::{count, duration, number, plural, rounded, rounded_beside},
 };
 use curvelax_ensemble::Spec;
 use curvelax_files::names::{ENSEMBLE, GROUPS};
@@ -46,6 +46,7 @@ pub struct Overview<'a> {
 
 impl fmt::Display for Overview<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let [sampling, discretisation] = self.errors();
         self.statuses(f)?;
         writeln!(f)?;
         match self.spec.names_members() {
@@ -59,8 +60,10 @@ impl fmt::Display for Overview<'_> {
             ("smoothing", self.tally.supplement.mollified.smoothing().unwrap_or_default()),
             (self.statistics.time(), self.relaxation()),
             ("t_relax", self.raw()),
-            ("error", self.error()),
+            ("sampling", sampling),
+            ("resolution", discretisation),
             ("nodes", self.tally.nodes.in_words().unwrap_or_default()),
+            ("t_error", self.tally.nodes.bounds_in_words().unwrap_or_default()),
             ("accuracy", self.accuracy()),
             ("rate", self.rate()),
             ("t_vanish", self.vanishing()),
@@ -104,14 +107,18 @@ impl Overview<'_> {
     }
 
     fn relaxation(&self) -> String {
-        // Which the table of statuses counts as vanished.
-        let later = match self.tally.relaxed_before_vanishing() {
+        self.only_cell().map_or(String::new(), |cell| unit(self.spec) + &self.relaxed(cell))
+    }
+
+    /// When the members of a cell relaxed, and which of them the table of statuses counts as vanished.
+    fn relaxed(&self, cell: &CellStatistics) -> String {
+        let later = cell.relaxed_before_vanishing();
+        let later = match later {
             0 => String::new(),
-            count => format!("; {count} vanished afterwards"),
+            _ if later == cell.members() => "; all of them vanished later".into(),
+            _ => format!("; {later} of them vanished later"),
         };
-        let line =
-            |cell| unit(self.spec) + &times(self.statistics.times(cell), self.limits_of(cell), "relaxed") + &later;
-        self.only_cell().map_or(String::new(), line)
+        times(self.statistics.times(cell), self.limits_of(cell), "relaxed") + &later
     }
 
     /// The times of a cell of which limits are shown, if they are.
@@ -142,13 +149,16 @@ impl Overview<'_> {
         let unit = unit_in_title(self.spec);
         let (time, error) = (self.statistics.time(), if self.statistics.of_limits { " ± t_error" } else { "" });
         let title = format!("{time}{error}{unit}");
+        let by_points = self.tally.named.iter().any(|member| member.t_data_error.is_some());
+        let of_points = |text: &str| if by_points { format!("{text:<12}  ") } else { String::new() };
         let wide = |all: &[String], title: &str| {
             all.iter().map(|text| text.chars().count()).fold(title.chars().count(), usize::max)
         };
         let (label, columns) = (wide(&names, "label"), wide(&times, &title));
-        writeln!(f, "{:<11}{:<label$}  {title:<columns$}  status", "member", "label")?;
+        writeln!(f, "{:<11}{:<label$}  {title:<columns$}  {}status", "member", "label", of_points("t_data_error"))?;
         for ((member, name), time) in self.tally.named.iter().zip(&names).zip(&times) {
-            write!(f, "{:<11}{name:<label$}  {time:<columns$}  {}", member.member, member.status.name())?;
+            let data = of_points(&member.t_data_error.map_or(String::new(), |error| rounded(error, 2)));
+            write!(f, "{:<11}{name:<label$}  {time:<columns$}  {data}{}", member.member, member.status.name())?;
             match (member.vanishing, member.t_vanish) {
                 (Some((limit, error)), _) => write!(f, " at the limit {}", with_error(limit, error))?,
                 (None, Some(t)) => write!(f, " at {}", significant(t))?,
@@ -159,13 +169,17 @@ impl Overview<'_> {
             }
             writeln!(f)?;
         }
+        if by_points {
+            let what = "how much the time changes if every second point of the outline is left out";
+            writeln!(f, "{:<11}± t_error is the error of the method; t_data_error is {what}", "")?;
+        }
         self.pairs(f)?;
         writeln!(f)
     }
 
-    /// The uncertainty of the median of a single ensemble, by its sources.
-    fn error(&self) -> String {
-        self.only_cell().map_or(String::new(), |cell| errors(cell, self.spec))
+    /// What sampling and discretisation do to the times of a single ensemble.
+    fn errors(&self) -> [String; 2] {
+        self.only_cell().map_or_else(Default::default, |cell| errors(cell, self.spec))
     }
 
     /// What `--accuracy` asked for, and what was reached in the cell that is farthest from it.
@@ -175,9 +189,9 @@ impl Overview<'_> {
         if let Some(lack) = Shortfall::of(self.spec, self.statistics) {
             return lack.in_words();
         }
-        let of_each = if self.statistics.of_each { " for each member" } else { "" };
+        let what = if self.statistics.of_each { "each t_limit" } else { "the median" };
         let reached = rounded_beside(self.statistics.uncertainty(), goal);
-        format!("{}{of_each} asked for, {reached} reached", number(goal))
+        format!("the relative uncertainty of {what} is {reached} ({} requested)", number(goal))
     }
 
     /// The rates of a single ensemble; empty if no member has one.
@@ -185,9 +199,10 @@ impl Overview<'_> {
         let Some(CellStatistics { rates: Rates { numbers, .. }, .. }) = self.only_cell() else { return String::new() };
         let Some(median) = numbers.get("median") else { return String::new() };
         let theory = numbers.get("ratio");
-        let theory = theory.map_or(String::new(), |ratio| format!(", {} times that of theory", significant(ratio)));
-        let members = plural(numbers.known as u64, "member");
-        format!("median {}{theory}, fitted to {} {members}", significant(median), numbers.known)
+        let theory =
+            theory.map_or(String::new(), |ratio| format!(", {} times that of linear theory", significant(ratio)));
+        let fits = count(numbers.known as u64, "fit");
+        format!("the median decay rate of the excess is {}{theory} ({fits})", significant(median))
     }
 
     /// One line per cell of a study, and how the cells compare.
@@ -198,14 +213,14 @@ impl Overview<'_> {
         }
         for cell in cells.iter().take(MAX_CELLS) {
             let (name, time) = (self.spec.sweep.name(cell.cell), self.statistics.time());
-            let of_cell = times(self.statistics.times(cell), self.limits_of(cell), "relaxed");
+            let of_cell = self.relaxed(cell);
             writeln!(f, "{:<11}{name}: {time} {}{of_cell}", format!("cell {}", cell.cell), unit(self.spec))?;
             if self.statistics.of_limits && cell.relaxing.times.mean.is_some() {
                 writeln!(f, "{:<11}t_relax {}", "", raw(&cell.relaxing.times, self.spec))?;
             }
-            let errors = errors(cell, self.spec);
+            let errors: Vec<String> = errors(cell, self.spec).into_iter().filter(|text| !text.is_empty()).collect();
             if !errors.is_empty() {
-                writeln!(f, "{:<11}{errors}", "")?;
+                writeln!(f, "{:<11}{}", "", errors.join("; "))?;
             }
             if let Some(vanished) = vanished(self.spec, cell) {
                 writeln!(f, "{:<11}t_vanish {vanished}", "")?;
@@ -216,7 +231,7 @@ impl Overview<'_> {
         compared(f, comparison, "cells", "")?;
         self.pairs(f)?;
         for text in scaling.iter().flat_map(|of| law(of, self.statistics.time())) {
-            writeln!(f, "{:<11}{text}", "law")?;
+            writeln!(f, "{:<11}{text}", "power law")?;
         }
         writeln!(f)
     }
@@ -229,7 +244,7 @@ impl Overview<'_> {
                 let time = self.statistics.time();
                 writeln!(
                     f,
-                    "{:<11}{time} minus that of the same member of cell 0 (Wilcoxon signed-rank test):",
+                    "{:<11}{time} compared with that of the same member of cell 0 (Wilcoxon signed-rank test):",
                     "pairs"
                 )?;
             }
@@ -263,17 +278,17 @@ impl Overview<'_> {
             0 => (total / members).to_string(),
             _ => significant(total as f64 / members as f64),
         };
-        let steps_each = match each(*steps) {
-            one if one == "1" => "1 step".into(),
-            several => format!("{several} steps"),
+        let of = |total: u64, one: &str| {
+            let each = each(total);
+            format!("{each} {}", plural(if each == "1" { 1 } else { 2 }, one))
         };
-        let solves_each = if solves == steps { String::new() } else { format!(" ({} solves)", each(*solves)) };
+        let solves_each = if solves == steps { String::new() } else { format!(" ({})", of(*solves, "solve")) };
         let sweeps = match sweeps_k + sweeps_x {
-            0 => "no sweeps".into(),
-            _ => format!("Gauss-Seidel sweeps {} for k and {} for x, y", each(*sweeps_k), each(*sweeps_x)),
+            0 => "without Gauss-Seidel sweeps".into(),
+            _ => format!("with {} Gauss-Seidel sweeps for k and {} for x, y", each(*sweeps_k), each(*sweeps_x)),
         };
-        let without = if self.spec.refine { "; without the runs at other resolutions" } else { "" };
-        format!("{steps_each} per member{solves_each}, {sweeps}{without}")
+        let without = if self.spec.refine { "; runs at other resolutions are not counted" } else { "" };
+        format!("each member took {}{solves_each} on average, {sweeps}{without}", of(*steps, "step"))
     }
 }
 
@@ -326,9 +341,10 @@ stalled             1    25.0 %
 all                 4
 
 ensemble   ellipse:2,1, surface-diffusion, amplitude 0.05, n = 100, tau = 0.001, t-end = 2, seed 1
-t_relax    median 0.5000 (range of 4, 0.3000 or more, covers 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that relaxed; 2 censored
-error      sampling not known: too few members relaxed; discretisation not known: no member has times at n, n/√2 and n/2 nodes
-work       10 steps per member, Gauss-Seidel sweeps 20 for k and 5 for x, y
+t_relax    median 0.5000 (range of all 4, 0.3000 or more, which contains the median with probability 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that relaxed; 2 censored
+sampling   the interval of the median is open: too few members relaxed
+resolution the error of discretisation is unknown: no member has times at n, n/√2 and n/2 nodes
+work       each member took 10 steps on average, with 20 Gauss-Seidel sweeps for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s
 results    out: summary.csv, run.json
@@ -353,13 +369,13 @@ results    out: summary.csv, run.json
         }
         let told = |tally: &Tally| {
             let text = overview(tally);
-            text.lines().find(|line| line.starts_with("error")).unwrap().to_string()
+            text.lines().find(|line| line.starts_with("resolution")).unwrap().to_string()
         };
-        let about = "; discretisation -2 % ± 0.0098 % (estimated from 4 members)";
+        let about = "discretisation makes t_relax 2 % ± 0.0098 % too short (estimated from 4 members)";
         let some = told(&tally);
         assert!(
             some.ends_with(&format!(
-                "{about}; times of 1 of them do not converge yet in n: use --refine, or more --points"
+                "{about}; 1 of them needs more nodes to show how its times converge: use --refine, or more --points"
             )),
             "{some}"
         );
@@ -367,7 +383,7 @@ results    out: summary.csv, run.json
         // Sampling is the larger one here.
         assert!(told(&tally).ends_with(about), "{}", told(&tally));
         tally.cells[0].relaxing.judged.iter_mut().for_each(|limit| limit.relative = -0.2);
-        assert!(told(&tally).ends_with(" dominates; add --accurate to remove it"), "{}", told(&tally));
+        assert!(told(&tally).ends_with("; --accurate removes this error"), "{}", told(&tally));
     }
 
     #[test]
@@ -375,7 +391,10 @@ results    out: summary.csv, run.json
         let mut tally = Tally::default();
         (0..4).for_each(|member| tally.add(&outcome(member, Status::Relaxed, Some(0.0))).unwrap());
         let text = overview(&tally);
-        assert!(text.contains("\nerror      discretisation not known"), "{text}");
+        assert!(
+            text.contains("\nresolution the error of discretisation is unknown") && !text.contains("\nsampling"),
+            "{text}"
+        );
     }
 
     #[test]
@@ -384,7 +403,8 @@ results    out: summary.csv, run.json
         let mut tally = Tally::of(&spec, &curvelax_ensemble::LevelTimes::default());
         let nodes = |tally: &Tally| {
             let text = overview(tally);
-            text.lines().find_map(|line| line.strip_prefix("nodes      ").map(String::from))
+            ["nodes      ", "t_error    "]
+                .map(|label| text.lines().find_map(|line| Some(line.strip_prefix(label)?.into())))
         };
         let mut add = |member: u64, points: u64, asymptotic: bool| {
             let judged = Some(Limit { t: 0.5, error: 1e-4, fixed: 0.0, order: None, asymptotic, relative: 0.0 });
@@ -392,16 +412,12 @@ results    out: summary.csv, run.json
             tally.add(&Outcome { judged, points, is_finer: points > 100, ..outcome }).unwrap();
             nodes(&tally)
         };
-        assert_eq!(add(0, 100, true), None);
-        assert_eq!(add(1, 100, false).as_deref(), Some("t_error of 1 of 2 members is a bound"));
-        assert_eq!(
-            add(2, 283, true).as_deref(),
-            Some("1 of 3 members needed more nodes, up to n = 283; t_error of 1 is a bound")
-        );
-        assert_eq!(
-            add(3, 141, true).as_deref(),
-            Some("2 of 4 members needed more nodes, up to n = 283; t_error of 1 is a bound")
-        );
+        let bound = |all: u64| Some(format!("is only an upper bound for 1 of {all} members"));
+        let more = |finer: u64, all: u64| Some(format!("{finer} of {all} members needed more nodes, up to n = 283"));
+        assert_eq!(add(0, 100, true), [None, None]);
+        assert_eq!(add(1, 100, false), [None, bound(2)]);
+        assert_eq!(add(2, 283, true), [more(1, 3), bound(3)]);
+        assert_eq!(add(3, 141, true), [more(2, 4), bound(4)]);
     }
 
     #[test]

@@ -23,7 +23,8 @@ pub enum Progress {
     Quiet,
     /// On a terminal.
     Bar(ProgressBar, ProgressPace),
-    /// To a function, with the members that have ended, all members, and the share of the work that is done.
+    /// To a function, with the members, or runs of members, that have ended, all of them, and the share of the work
+    /// that is done.
     Callback(Box<dyn FnMut(u64, u64, f64)>),
     /// In a file or a pipe, with the start of the run.
     Lines(Instant, ProgressLines, ProgressPace),
@@ -77,16 +78,16 @@ impl Progress {
         if bar.is_hidden() { lines() } else { Progress::Bar(bar, ProgressPace::default()) }
     }
 
-    /// `done` of `total` members have ended; `share` ∈ [0, 1] of the work is done.
-    pub fn show(&mut self, done: u64, total: u64, share: f64) {
+    /// `done` of `total` members, or runs of members, have ended; `share` ∈ [0, 1] of the work is done.
+    pub fn show(&mut self, done: u64, total: u64, share: f64, what: &str) {
         match self {
             Progress::Quiet => {}
-            Progress::Bar(bar, pace) => show_bar(bar, pace, &members(done, total), share.clamp(0.0, 1.0)),
+            Progress::Bar(bar, pace) => show_bar(bar, pace, &ended(done, total, what), share.clamp(0.0, 1.0)),
             Progress::Callback(tell) => tell(done, total, share),
             Progress::Lines(began, lines, pace) => {
                 let share = share.clamp(0.0, 1.0);
                 let left = pace.left(share);
-                if let Some(line) = lines.at(began.elapsed(), || line(done, total, share, left)) {
+                if let Some(line) = lines.at(began.elapsed(), || line(&ended(done, total, what), share, left)) {
                     let _ = writeln!(io::stderr().lock(), "{line}");
                 }
             }
@@ -136,13 +137,13 @@ fn show_bar(bar: &ProgressBar, pace: &mut ProgressPace, what: &str, share: f64) 
     bar.set_position((share * TICKS as f64) as u64);
 }
 
-fn line(done: u64, total: u64, share: f64, left: Option<Duration>) -> String {
+fn line(ended: &str, share: f64, left: Option<Duration>) -> String {
     let left = left.map_or(String::new(), |left| format!(", about {} left", duration(left.as_secs_f64())));
-    format!("{}, {:.1} %{left}", members(done, total), 100.0 * share)
+    format!("{ended}, {:.1} %{left}", 100.0 * share)
 }
 
-fn members(done: u64, total: u64) -> String {
-    format!("{done} of {total} {}", plural(total, "member"))
+fn ended(done: u64, total: u64, what: &str) -> String {
+    format!("{done} of {total} {}", plural(total, what))
 }
 
 #[cfg(test)]
@@ -152,6 +153,7 @@ mod tests {
     #[test]
     fn a_line_estimates_what_is_left() {
         let left = time_left(Duration::from_secs(30), 0.0, 0.25);
+        let line = |done, total, share, left| line(&ended(done, total, "member"), share, left);
         assert_eq!(line(64, 256, 0.25, left), "64 of 256 members, 25.0 %, about 1 min 30 s left");
         assert_eq!(line(0, 256, 0.0, None), "0 of 256 members, 0.0 %");
         let left = time_left(Duration::from_secs(30), 0.0, 0.5);

@@ -173,7 +173,7 @@ pub(super) fn unit(spec: &Spec) -> String {
 pub(super) fn raw(of: &TimeStatistics, spec: &Spec) -> String {
     let Some(mean) = of.mean else { return String::new() };
     let median = of.median().map_or("no median".into(), |median| format!("median {}", significant(median)));
-    format!("of this run, at n = {}: {median}, mean {}", spec.points, significant(mean.value))
+    format!("at n = {}: {median}, mean {}", spec.points, significant(mean.value))
 }
 
 /// The name of a member: that of its outline, and what distinguishes its cell.
@@ -225,8 +225,9 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
     let half = || format!("no median, as fewer than half of the members {did}");
     let median = of.median().map_or_else(half, |median| format!("median {}", significant(median)));
     let both = if raw.is_some() { ", for sampling and discretisation" } else { "" };
-    let interval =
-        of.interval().map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
+    // If all are equal, there is none.
+    let interval = of.interval().filter(|interval| interval.lower != interval.upper);
+    let interval = interval.map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
     let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let without = raw.map_or(0, |raw| raw.sample.events() as u64).saturating_sub(known);
@@ -240,66 +241,70 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
     )
 }
 
-/// What sampling and discretisation do to the median of a cell, and what to do about the larger one.
-pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> String {
-    let EventStatistics { times, discretisation, limits, .. } = &cell.relaxing;
+/// What sampling and discretisation do to the times of a cell, a sentence each, and what to do if discretisation does
+/// more.
+pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
+    let EventStatistics { times, limits, .. } = &cell.relaxing;
     if times.sample.events() == 0 {
-        return String::new();
+        return Default::default();
     }
     let bounds = times.interval().and_then(|interval| interval.bounds());
-    // The interval of the limits says it already, together with what follows.
-    let sampling = bounds.filter(|_| limits.is_none());
     let half = bounds.zip(times.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
     // Members that start at rest have none.
     let half = half.filter(|half| half.is_finite());
-    let sampling = match sampling.and(half) {
-        Some(half) => format!("sampling ±{} %; ", rounded(100.0 * half, 2)),
-        None if bounds.is_none() && limits.is_none() && times.sample.len() > 1 => {
-            "sampling not known: too few members relaxed; ".into()
+    let sampling = match half {
+        // Their interval is for both, and says so.
+        _ if limits.is_some() => String::new(),
+        Some(half) => format!("the interval of the median, ±{} %, is for sampling alone", rounded(100.0 * half, 2)),
+        None if bounds.is_none() && times.sample.len() > 1 => {
+            "the interval of the median is open: too few members relaxed".into()
         }
         None => String::new(),
     };
+    [sampling, discretisation(cell, spec, half)]
+}
+
+/// What discretisation does to the times of a cell, beside `half` the relative interval of their median.
+fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> String {
+    let EventStatistics { discretisation, limits, .. } = &cell.relaxing;
     let Some(discretisation) = discretisation else {
         if limits.is_some() {
             return String::new();
         }
-        return format!("{sampling}discretisation not known: no member has times at n, n/√2 and n/2 nodes");
+        return "the error of discretisation is unknown: no member has times at n, n/√2 and n/2 nodes".into();
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
-    let remedy = if spec.refine { "t_error bounds them" } else { "use --refine, or more --points" };
-    let bound = limits.as_ref().and_then(|limits| limits.error);
-    if let (false, Some(bound)) = (discretisation.converges(), bound) {
-        return format!(
-            "{sampling}t_error {} (median), a bound: times of {not_asymptotic} of {members} {known} do not converge yet in n",
-            significant(bound)
-        );
-    }
+    let remedy = if spec.refine { "t_error bounds the error" } else { "use --refine, or more --points" };
+    let (need, whose) = if not_asymptotic == 1 { ("needs", "its") } else { ("need", "their") };
+    let unclear = format!("{need} more nodes to show how {whose} times converge");
     if !discretisation.converges() {
-        return format!(
-            "{sampling}discretisation not known: times of {not_asymptotic} of {members} {known} do not converge yet in n; \
-             {remedy}"
-        );
+        return match limits.as_ref().and_then(|limits| limits.error) {
+            Some(bound) => format!(
+                "the median t_error, {}, is an upper bound: {not_asymptotic} of {members} {known} {unclear}",
+                significant(bound)
+            ),
+            None => format!(
+                "the error of discretisation is unknown: {not_asymptotic} of {members} {known} {unclear}; {remedy}"
+            ),
+        };
     }
-    let percent = |value: f64| rounded(100.0 * value, 2);
-    let [mean_told, error] = [mean, error].map(percent);
+    let [size, error] = [mean.abs(), error].map(|value| rounded(100.0 * value, 2));
     // The bar of one member is not the spread of all.
     let spread = if members == 1 { String::new() } else { format!(" ± {error} %") };
-    let about = format!("{sampling}discretisation {mean_told} %{spread} (estimated from {members} {known})");
+    let side = if mean < 0.0 { "short" } else { "long" };
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
-        () if not_asymptotic > 0 => {
-            format!("; times of {not_asymptotic} of them do not converge yet in n: {remedy}")
-        }
-        () if spec.refine => ", removed from t_limit".into(),
+        () if not_asymptotic > 0 => format!("; {not_asymptotic} of them {unclear}: {remedy}"),
+        () if spec.refine => "; t_limit is free of this error".into(),
         () if larger && spec.has_vesicles_in(cell.cell) => {
-            " dominates; more --points lessen it, or --accurate in f64".into()
+            "; more --points reduce this error, or --accurate in f64".into()
         }
-        () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => " dominates; add --refine to remove it".into(),
-        () if larger => " dominates; add --accurate to remove it".into(),
+        () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => "; --refine removes this error".into(),
+        () if larger => "; --accurate removes this error".into(),
         () => String::new(),
     };
-    format!("{about}{advice}")
+    format!("discretisation makes t_relax {size} %{spread} too {side} (estimated from {members} {known}){advice}")
 }
 
 /// The power law of the medians, how well it fits, and the cells that are not in the fit.
@@ -314,13 +319,14 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
         });
         match fit {
             Some(fit) if of.is_rejected() => {
-                format!("median {time} is no power of {scale}: {fit}; the nearest power is {exponent}")
+                format!(
+                    "median {time} does not follow a power law in {scale} ({fit}); the nearest exponent is {exponent}"
+                )
             }
             Some(fit) => format!("median {time} scales as {scale} to the power {exponent}; {fit}"),
             None => {
-                let why =
-                    if count < 3 { "two cells do not test it" } else { "without sampling errors it is not tested" };
-                format!("median {time} scales as {scale} to the power {exponent}; {why}")
+                let why = if count < 3 { "with two cells" } else { "without sampling errors" };
+                format!("median {time} scales as {scale} to the power {exponent}; {why} this cannot be tested")
             }
         }
     });
@@ -334,15 +340,16 @@ pub(super) fn paired(of: &CellDifference) -> String {
     let CellDifference { pairs, equal, median, interval, test, left_out, .. } = of;
     let which = plural(*pairs as u64, "pair");
     let difference = match (median, interval, test) {
-        (None, ..) => "in no pair both relaxed".into(),
-        (Some(0.0), _, None) => format!("equal in {pairs} {which}"),
-        (Some(median), _, None) => format!("{} in {pairs} {which}, not tested", significant(*median)),
+        (None, ..) => "has no pair in which both relaxed".into(),
+        (Some(0.0), _, None) => format!("is equal in {pairs} {which}"),
+        (Some(median), _, None) => format!("differs by {} in {pairs} {which}, not tested", significant(*median)),
         (Some(median), interval, Some(test)) => {
             let bounds = interval.map_or(String::new(), |(low, high)| {
                 format!(" (95 % interval {} to {})", significant(low), significant(high))
             });
             let equal = if *equal > 0 { format!(", {equal} of them equal") } else { String::new() };
-            format!("median {}{bounds}, {} over {pairs} {which}{equal}", significant(*median), p_value(test.p_value))
+            let (median, p) = (significant(*median), p_value(test.p_value));
+            format!("differs by a median of {median}{bounds}, {p} over {pairs} {which}{equal}")
         }
     };
     let LeftOut { later, earlier, unknown } = left_out;
@@ -387,15 +394,14 @@ mod tests {
             test: Some(test),
             left_out: LeftOut { later: 0, earlier: 2, unknown: 1 },
         };
-        let median =
-            "median -0.001250 (95 % interval -0.001500 to -0.001000), p = 1.0e-85 over 512 pairs, 2 of them equal";
+        let median = "differs by a median of -0.001250 (95 % interval -0.001500 to -0.001000), p = 1.0e-85 over 512 pairs, 2 of them equal";
         let left_out = "; 3 left out, since a member did not relax (2 earlier, 1 of unknown order)";
         assert_eq!(paired(&some), format!("{median}{left_out}"));
         let equal = CellDifference { median: Some(0.0), test: None, left_out: LeftOut::default(), ..some.clone() };
-        assert_eq!(paired(&equal), "equal in 512 pairs");
+        assert_eq!(paired(&equal), "is equal in 512 pairs");
         let copies = CellDifference { pairs: 1, median: Some(0.5), ..equal.clone() };
-        assert_eq!(paired(&copies), "0.5000 in 1 pair, not tested");
-        assert_eq!(paired(&CellDifference { median: None, ..equal }), "in no pair both relaxed");
+        assert_eq!(paired(&copies), "differs by 0.5000 in 1 pair, not tested");
+        assert_eq!(paired(&CellDifference { median: None, ..equal }), "has no pair in which both relaxed");
     }
 
     #[test]
@@ -418,11 +424,11 @@ mod tests {
             law(&of(Some(0.25), 5), "t_relax"),
             [format!("{holds}; chi2 = 12.50 with 3 degrees of freedom, p = 0.25")]
         );
-        let rejected = "median t_relax is no power of amplitude: chi2 = 12.50 with 3 degrees of freedom, p = 1.0e-7; the nearest power is -0.2500, \
+        let rejected = "median t_relax does not follow a power law in amplitude (chi2 = 12.50 with 3 degrees of freedom, p = 1.0e-7); the nearest exponent is -0.2500, \
                         standard error 0.01000";
         assert_eq!(law(&of(Some(1e-7), 5), "t_relax"), [rejected]);
-        assert_eq!(law(&of(None, 2), "t_relax"), [format!("{holds}; two cells do not test it")]);
-        assert_eq!(law(&of(None, 4), "t_relax"), [format!("{holds}; without sampling errors it is not tested")]);
+        assert_eq!(law(&of(None, 2), "t_relax"), [format!("{holds}; with two cells this cannot be tested")]);
+        assert_eq!(law(&of(None, 4), "t_relax"), [format!("{holds}; without sampling errors this cannot be tested")]);
         let none = Scaling { law: None, left_out: vec![(3, "its median is 0")], ..of(None, 0) };
         let lines = [
             "no power of amplitude is fitted: too few cells have a median",

@@ -64,7 +64,7 @@ impl Session {
     ) -> Result<Session> {
         let (report, progress) = RunReport::resume(folder, &placed.study, saved, options)?;
         let (members, all) = (report.members(), placed.study.member_count());
-        host.say(&format!("resuming: {members} of {all} members are in the table"));
+        host.say(&format!("resuming: {members} of {all} members finished"));
         Ok(Session { placed, first: FirstBackend::Unopened, report, progress })
     }
 

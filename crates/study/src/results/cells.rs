@@ -156,6 +156,12 @@ impl CellStatistics {
         self.counts.iter().sum()
     }
 
+    /// Number of members that relaxed before they vanished.
+    pub fn relaxed_before_vanishing(&self) -> u64 {
+        let relaxed = (self.relaxing.times.sample.events() as u64).saturating_sub(self.counts[0]);
+        relaxed.min(self.vanishing.times.sample.events() as u64)
+    }
+
     /// The numbers on the times at which members vanished, for the table.
     pub fn vanished(&self) -> Numbers {
         let times = &self.vanishing.times;
@@ -189,7 +195,10 @@ impl CellStatistics {
         let statuses = Status::ALL.map(Status::name).into_iter().zip(self.counts);
         row.extend(statuses.map(|(name, members)| count(name, members, format!("members that ended {name}"))));
         let with_known = |(quantity, numbers): &(&str, Numbers)| {
-            let meaning = format!("members with a {quantity}");
+            let meaning = match *quantity {
+                "discretisation" => "members on which the discretisation error was estimated".into(),
+                _ => format!("members with a {quantity}"),
+            };
             let known = count(format!("{quantity}_known"), numbers.known as u64, meaning);
             [known].into_iter().chain(floats(quantity, &numbers.named)).collect::<Vec<_>>()
         };
@@ -238,7 +247,7 @@ impl EventStatistics {
     /// The numbers on its error of discretisation, for the table.
     pub fn errors(&self) -> Numbers {
         let number = |number: fn(&DiscretisationError) -> f64| self.discretisation.as_ref().map(number);
-        let mean = "relative error of the time that n and the steps leave, negative if it is too early: mean of these";
+        let mean = "mean relative error of the times by n and the steps, negative if they are too early";
         let named = vec![
             Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
             Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
@@ -253,10 +262,10 @@ impl EventStatistics {
         let error = self.limits.as_ref().and_then(|limits| limits.error);
         let of = |number: fn(Mean) -> Option<f64>| times.and_then(|times| times.mean).and_then(number);
         let interval = times.and_then(TimeStatistics::interval);
-        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together; of fewer than \
-                   6 that of their range; empty if there is none";
-        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together; of fewer \
-                    than 6 that of their range; empty if there is none";
+        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together (with fewer than \
+                   6 members, of their range); empty if there is none";
+        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together (with fewer \
+                    than 6 members, of their range); empty if there is none";
         let named = vec![
             Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
             Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },

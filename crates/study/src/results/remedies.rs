@@ -13,7 +13,7 @@ use curvelax_flow::forcing::Drive;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Remedies {
     geometric: bool,
-    adaptive: bool,
+    pub(super) adaptive: bool,
     pulled: bool,
     driven: bool,
     vesicles: bool,

@@ -31,10 +31,10 @@ impl Shortfall {
         (reached > goal).then(|| Shortfall { goal, reached, why: why(spec, cell, goal, statistics.of_each) })
     }
 
-    /// `0.01 asked for, 0.013 reached: …`.
+    /// `0.013 reached, 0.01 requested: …`.
     pub fn in_words(&self) -> String {
         let Shortfall { goal, reached, why } = self;
-        format!("{} asked for, {} reached: {why}", number(*goal), rounded_beside(*reached, *goal))
+        format!("{} reached, {} requested: {why}", rounded_beside(*reached, *goal), number(*goal))
     }
 
     /// `--accuracy 0.01: 0.013 was reached; …`.
@@ -57,18 +57,16 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             count(cell.members(), "member")
         ),
         Some((all, _)) if of_each && 2.0 * rounding(cell) > all => format!(
-            "{} of it is what rounding corners does: use a smaller --rounding, or a larger --accuracy",
+            "{} of it is due to the rounding of corners: use a smaller --rounding, or a larger --accuracy",
             rounded(rounding(cell), 2)
         ),
         Some(_) if of_each => {
-            format!(
-                "t_error tells which members are not known that well at n = {points}: use more --points, or a larger --accuracy"
-            )
+            format!("t_error is larger for some members at n = {points}: use more --points, or a larger --accuracy")
         }
         Some((all, discretisation)) if 2.0 * discretisation > all => {
             let discretisation = rounded(discretisation, 2);
             format!(
-                "{discretisation} of it is discretisation at n = {points}: use more --points, or a larger --accuracy"
+                "{discretisation} of it is due to discretisation at n = {points}: use more --points, or a larger --accuracy"
             )
         }
         Some(_) => match needed(cell, goal) {
@@ -130,19 +128,18 @@ mod tests {
             "--accuracy 0.02: 0.027 was reached; sampling alone needs about 98 members in each cell: use more --curves";
         assert_eq!(lacks(0.02, 0.1, 1e-5, None).unwrap().split(" to begin").next(), Some(sampling));
         assert_eq!(lacks(0.028, 0.1, 1e-5, None), None);
-        let steps =
-            "--accuracy 0.028: 0.057 was reached; 0.03 of it is discretisation at n = 100: use more --points, or";
+        let steps = "--accuracy 0.028: 0.057 was reached; 0.03 of it is due to discretisation at n = 100: use more --points, or";
         assert!(lacks(0.028, 0.1, 0.03, None).unwrap().starts_with(steps), "{:?}", lacks(0.028, 0.1, 0.03, None));
         // Of outlines each member counts, and sampling is no error.
         assert_eq!(lacks(0.02, 0.1, 1e-3, Some(64)), None);
-        let each = "--accuracy 0.02: 0.033 was reached; t_error tells which members are not known that well at n = 100";
+        let each = "--accuracy 0.02: 0.033 was reached; t_error is larger for some members at n = 100";
         assert!(lacks(0.02, 0.1, 0.03, Some(64)).unwrap().starts_with(each), "{:?}", lacks(0.02, 0.1, 0.03, Some(64)));
     }
 
     #[test]
     fn errors_that_no_nodes_lessen_name_the_radius_of_corners() {
         let of_rounding =
-            "--accuracy 0.02: 0.033 was reached; 0.022 of it is what rounding corners does: use a smaller";
+            "--accuracy 0.02: 0.033 was reached; 0.022 of it is due to the rounding of corners: use a smaller";
         let told = lacks_with(0.02, 0.1, [0.03, 0.02], Some(64)).unwrap();
         assert!(told.starts_with(of_rounding), "{told}");
         // The control: a small part of it.
@@ -161,7 +158,7 @@ mod tests {
             Shortfall::of(&spec, &EnsembleStatistics::new(&spec, &mut tally).unwrap()).unwrap().in_words()
         };
         assert!(
-            told(&[None; 8]).starts_with("0.1 asked for, no interval reached: 0 of 8 members have a limit, too few")
+            told(&[None; 8]).starts_with("no interval reached, 0.1 requested: 0 of 8 members have a limit, too few")
         );
         assert!(told(&[Some(0.0); 8]).contains("relaxed at the start: use a larger --amplitude"));
     }

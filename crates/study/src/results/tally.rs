@@ -89,6 +89,8 @@ pub struct MemberTime {
     pub t_limit: Option<f64>,
     /// Half-width of the 95 % interval of that.
     pub t_error: Option<f64>,
+    /// By how much the time changes with every second point of its outline.
+    pub t_data_error: Option<f64>,
     /// The times of the events, or their limits, in the order of the spec.
     pub events: Vec<Option<f64>>,
 }
@@ -96,14 +98,27 @@ pub struct MemberTime {
 impl MemberTime {
     fn new(outcome: &Outcome, counted: Counted) -> MemberTime {
         let Counted { refined, vesicles, .. } = counted;
-        let Outcome { member, cell, status, t_end, t_relax, t_vanish, t_limit, t_error, .. } = *outcome;
+        let Outcome { member, cell, status, t_end, t_relax, t_vanish, t_limit, t_error, t_data_error, .. } = *outcome;
         let later_than = Some(t_end).filter(|_| !vesicles && t_relax.is_none());
         let limit = |i: usize| outcome.limit_of_event(i).filter(|_| refined);
         let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
         let events = outcome.events.iter().enumerate().map(event).collect();
         let label = outcome.label.clone();
         let vanishing = outcome.t_vanish_limit.zip(outcome.t_vanish_error);
-        MemberTime { member, cell, label, status, later_than, t_relax, t_vanish, vanishing, t_limit, t_error, events }
+        MemberTime {
+            member,
+            cell,
+            label,
+            status,
+            later_than,
+            t_relax,
+            t_vanish,
+            vanishing,
+            t_limit,
+            t_error,
+            t_data_error,
+            events,
+        }
     }
 
     /// The time that is shown: the limit, if there is one, with its error.
@@ -475,9 +490,9 @@ mod tests {
         assert_eq!(tally.supplement.mollified.smoothing(), None);
         tally.add_supplement(&well, false);
         assert_eq!((tally.warnings(), tally.supplement.mollified.members), (vec![], 1));
-        let words = "1 member was smoothed until the nodes resolved its outline, in at most 7 rounds: the area changed \
-                     by at most 5.0 %";
-        assert_eq!(tally.supplement.mollified.smoothing(), Some(format!("{words}, which was then restored")));
+        let words = "1 member was smoothed until the nodes resolved it (at most 7 rounds): the area changed by at most 5.0 % and was \
+                     restored";
+        assert_eq!(tally.supplement.mollified.smoothing().as_deref(), Some(words));
         tally.add_supplement(&Mollified { crossed: true, sharp: true, ..well }, false);
         tally.add_supplement(&Mollified { area_change: -0.2, ..well }, false);
         assert!(tally.supplement.mollified.smoothing().is_some_and(|told| told.ends_with("by at most 20 %")));

@@ -74,8 +74,7 @@ impl TimeStatistics {
         let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
         let (mean, sd) = (of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation));
         let (se, restricted_to) = (of(|mean| mean.standard_error), of(|mean| mean.restricted_to));
-        let restricted =
-            "time to which the mean is restricted, a lower bound then, since the last members are censored";
+        let restricted = "where the longest times are censored, the mean is restricted to times up to this one, and is a lower bound";
         let moments = [
             Statistic { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
             Statistic { name: "sd", value: sd, meaning: "standard deviation" },
@@ -133,8 +132,10 @@ pub(super) fn places(
     interval: Option<Interval>,
 ) -> impl Iterator<Item = Statistic> {
     let [value, upper] = ends(interval);
-    let low = "lower end of the 95 % interval of the median, the least of fewer than 6; empty if there is none";
-    let high = "upper end of the 95 % interval of the median, the largest of fewer than 6; empty if there is none";
+    let low =
+        "lower end of the 95 % interval of the median (with fewer than 6 members, the minimum); empty if there is none";
+    let high =
+        "upper end of the 95 % interval of the median (with fewer than 6 members, the maximum); empty if there is none";
     let ends = [
         Statistic { name: "median_low", value, meaning: low },
         Statistic { name: "median_high", value: upper, meaning: high },
@@ -176,7 +177,7 @@ pub(super) fn intervals(of: &[Option<Interval>; QUANTILES.len()]) -> Vec<Statist
 
 /// What the interval of the median covers.
 pub(super) fn covered(median: Option<Interval>) -> Statistic {
-    let meaning = "probability with which median_low and median_high hold the median, at least";
+    let meaning = "probability that the median is between median_low and median_high, a lower bound";
     Statistic { name: "median_coverage", value: median.map(|interval| interval.coverage), meaning }
 }
 

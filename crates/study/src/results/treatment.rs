@@ -88,9 +88,9 @@ impl MollifiedMembers {
         let change = significant(100.0 * outline_area_change, 2);
         let round = match rounded {
             0 => String::new(),
-            _ => format!(
-                "; corners of {rounded} were rounded, which changed the area by at most {change} % until it was restored"
-            ),
+            _ => {
+                format!("; corners of {rounded} were rounded: the area changed by at most {change} % and was restored")
+            }
         };
         (!parts.is_empty()).then(|| format!("{}{round}", parts.join(", ")))
     }
@@ -99,13 +99,13 @@ impl MollifiedMembers {
     pub fn smoothing(&self) -> Option<String> {
         let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
         // Of those two kinds some are left with another area.
-        let restored = if crossed + distorted == 0 { ", which was then restored" } else { "" };
+        let restored = if crossed + distorted == 0 { " and was restored" } else { "" };
         (members > 0).then(|| {
             format!(
-                "{members} {} smoothed until the nodes resolved {}, in at most {most_rounds} {}: the area changed by at \
-                 most {} %{restored}",
-                if members == 1 { "member was" } else { "members were" },
-                if members == 1 { "its outline" } else { "their outlines" },
+                "{} smoothed until the nodes resolved {} (at most {most_rounds} {}): the area changed by at most {} \
+                 %{restored}",
+                if members == 1 { "1 member was".into() } else { format!("{members} members were") },
+                if members == 1 { "it" } else { "them" },
                 plural(most_rounds.into(), "round"),
                 significant(100.0 * largest_area_change, 2)
             )
@@ -162,16 +162,16 @@ impl FinerMembers {
         (finer > 0).then(|| (format!("{finer} of {judged}"), format!("up to n = {most}")))
     }
 
-    /// How many needed more nodes, up to how many, and what of them is not known; `None` if n nodes were enough for
-    /// all.
+    /// How many needed more nodes, and up to how many; `None` if n nodes were enough for all.
     pub fn in_words(&self) -> Option<String> {
-        let FinerMembers { judged, finer, most, bounds } = *self;
-        let all = format!("{judged} {}", plural(judged, "member"));
-        let more = (finer > 0).then(|| format!("{finer} of {all} needed more nodes, up to n = {most}"));
-        let open = (bounds > 0).then(|| match finer {
-            0 => format!("t_error of {bounds} of {all} is a bound"),
-            _ => format!("t_error of {bounds} is a bound"),
-        });
-        (finer + bounds > 0).then(|| more.into_iter().chain(open).collect::<Vec<_>>().join("; "))
+        let FinerMembers { judged, finer, most, .. } = *self;
+        let all = plural(judged, "member");
+        (finer > 0).then(|| format!("{finer} of {judged} {all} needed more nodes, up to n = {most}"))
+    }
+
+    /// Of how many the error is only a bound; `None` if it is of none.
+    pub fn bounds_in_words(&self) -> Option<String> {
+        let FinerMembers { judged, bounds, .. } = *self;
+        (bounds > 0).then(|| format!("is only an upper bound for {bounds} of {judged} {}", plural(judged, "member")))
     }
 }

@@ -46,7 +46,7 @@ fn table(rows: usize) -> PageTable {
 
 fn warnings() -> Vec<String> {
     vec![
-        "12 of 4096 members failed (see status); unless the flow itself becomes singular, a smaller --tau or --adaptive, \
+        "12 of 4096 members failed (see status): unless the flow itself becomes singular, a smaller --tau or --adaptive, \
          or more --points, helps"
             .into(),
         "88 members are censored: the mean t_relax is biased low, so read the median".into(),

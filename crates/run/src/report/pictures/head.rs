@@ -50,8 +50,8 @@ impl FinishedRun<'_> {
         };
         match self.statistics.of_limits {
             true => format!(
-                "t_limit is the limit of t_relax for many nodes and short steps{}; t_relax itself is that of this run, at \
-                 n = {}. Times are {unit}.",
+                "t_limit is the limit of t_relax for many nodes and short steps{}; t_relax itself is the time at n = {}. \
+                 Times are {unit}.",
                 if self.spec().drive.is_some() { ", t_vanish_limit that of t_vanish" } else { "" },
                 self.spec().points
             ),
@@ -159,8 +159,9 @@ impl FinishedRun<'_> {
     fn of_member(&self, member: &MemberTime) -> Headline {
         let value = format!("{}{}", member_time(member), time_unit(self.spec()));
         let time = if member.t_limit.is_some() { "t_limit" } else { "t_relax" };
-        let (label, status) = (member_name(self.spec(), member), member.status.name());
-        Headline::new(label, format!("{time} = {value}").replace("= >", ">"), status)
+        let data = member.t_data_error.map(|error| format!("t_data_error {}", significant(error, 2)));
+        let note = [member.status.name().into()].into_iter().chain(data).collect::<Vec<_>>().join(", ");
+        Headline::new(member_name(self.spec(), member), format!("{time} = {value}").replace("= >", ">"), note)
     }
 
     /// The only cell.
@@ -204,7 +205,7 @@ impl FinishedRun<'_> {
             (time_unit(self.spec()), cell.relaxing.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
         let bound = match open {
             0 => "half-width of the 95 % interval of each t_limit".into(),
-            _ => format!("a bound for {}: times do not converge yet in n", count(open as u64, "member")),
+            _ => format!("only an upper bound for {}", count(open as u64, "member")),
         };
         let shown = |value: f64, digits: usize| format!("{}{unit}", significant(value, digits));
         let error = cell.relaxing.limits.as_ref().and_then(|limits| limits.error);
@@ -232,7 +233,7 @@ fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
     let known = count(*members as u64, "member");
     let (value, note) = match discretisation.converges() {
         true => (format!("{mean} %"), format!("± {error} % of t_relax, estimated from {known}")),
-        false => ("not known".into(), format!("most times of {known} do not converge yet in n")),
+        false => ("unknown".into(), format!("most of {known} need more nodes to show how their times converge")),
     };
     vec![Headline::new("discretisation error", value, note)]
 }

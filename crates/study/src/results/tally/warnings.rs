@@ -14,12 +14,18 @@ impl Tally {
         let members = format!("{} {}", self.members(), plural(self.members(), "member"));
         let failed = self.failed();
         if failed > 0 {
-            let stalled = self.counts().any(|(status, count)| status == Status::Stalled && count > 0);
-            // Members that creep are stalled, too, without a sweep.
+            let stalled: u64 =
+                self.counts().filter(|(status, _)| *status == Status::Stalled).map(|(_, count)| count).sum();
+            // Members that creep are stalled, too, without a sweep or in adaptive steps.
             let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
-            let direct = if stalled && swept { "where sweeps stalled, --solver direct helps; " } else { "" };
-            warnings
-                .push(format!("{failed} of {members} failed (see `status`); {direct}{}", self.remedies.of_failures()));
+            let remedy = match stalled > 0 && swept {
+                true if stalled == failed && !self.remedies.adaptive => {
+                    "Gauss-Seidel sweeps did not converge; use --solver direct".into()
+                }
+                true => format!("use --solver direct where sweeps stalled; {}", self.remedies.of_failures()),
+                false => self.remedies.of_failures(),
+            };
+            warnings.push(format!("{failed} of {members} failed (see `status`): {remedy}"));
         }
         warnings.extend(self.vanished());
         warnings.extend(self.late());
@@ -37,17 +43,17 @@ impl Tally {
         if self.counted.refined && open > 0 {
             let all = judged().count();
             warnings.push(format!(
-                "t_limit of {open} of {all} {} goes by a single term of the error, and t_error is a wide bound: their times do \
-                 not converge in n (see `points`){}",
+                "the times of {open} of {all} {} do not converge in n (see `points`): their t_limit assumes a single term of \
+                 the error, and their t_error is a wide bound{}",
                 plural(all as u64, "member"),
                 if self.has_outlines { "; fewer nodes are enough with a larger --rounding" } else { "" }
             ));
         }
         if let (coarse @ 1.., most) = self.coarse {
             warnings.push(format!(
-                "the outlines of {coarse} of {members} have too few points: without every second one, their times move by up \
-                 to {} % (see `t_data_error`); give more points, or --interpolate spline if the outlines are smooth between \
-                 these",
+                "the outlines of {coarse} of {members} have too few data points: without every second one, their times change \
+                 by up to {} % (see `t_data_error`); give more points, or --interpolate spline if the outlines are smooth \
+                 between these",
                 significant(100.0 * most, 2)
             ));
         }
@@ -82,8 +88,8 @@ impl Tally {
         let all = self.members();
         (before > 0).then(|| {
             format!(
-                "{before} of {all} {} vanished before they relaxed: to t_relax they are censored then, as if they would relax later; \
-                 see t_vanish",
+                "{before} of {all} {} vanished before they relaxed: for t_relax they are censored at that time, as if they \
+                 would relax later; see t_vanish",
                 plural(all, "member")
             )
         })
@@ -95,8 +101,8 @@ impl Tally {
         let moving: u64 = some.map(|cell| cell.moving).sum();
         (moving > 0).then(|| {
             format!(
-                "{moving} of {} still moved at their final time, or came back near the threshold of the energy: when they \
-                 relax is not known, and the statistics are of the others, mostly the fast ones; {}",
+                "{moving} of {} still moved at their final time, or came back near the threshold of the energy: their t_relax \
+                 is unknown, and the statistics are those of the others, mostly the fast ones; {}",
                 count(self.members(), "member"),
                 self.remedies.of_time()
             )
@@ -120,7 +126,7 @@ impl Tally {
             let members = count(self.members(), "member");
             let round = if did == "vanished" { ", or they were not round at the end" } else { "" };
             format!(
-                "{without} of {members} {did} and have no limit, as their times at the levels do not tell one (see {file})\
+                "{without} of {members} {did} and have no limit, as their times at other resolutions show none (see {file})\
                  {round}: among the limits they count as later than their own time; more --points may help"
             )
         };
@@ -185,7 +191,7 @@ mod tests {
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
         assert_eq!(vesicles.named[0].later_than, None);
         let warning = "2 of 3 members still moved at their final time, or came back near the threshold of the energy: \
-                       when they relax is not known, and the statistics are of the others, mostly the fast ones; use a longer --t-end, or another --relax-to";
+                       their t_relax is unknown, and the statistics are those of the others, mostly the fast ones; use a longer --t-end, or another --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
         // The control: members with one of the two are censored, in a sweep, too.
         let sweep = "flow = 'willmore'\n[sweep]\nconserve = ['area', 'area,length']";
