@@ -255,7 +255,7 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
     let sampling = match half {
         // Their interval is for both, and says so.
         _ if limits.is_some() => String::new(),
-        Some(half) => format!("the interval of the median, ±{} %, is for sampling alone", rounded(100.0 * half, 2)),
+        Some(half) => format!("the interval of the median, ±{} %, covers sampling alone", rounded(100.0 * half, 2)),
         None if bounds.is_none() && times.sample.len() > 1 => {
             "the interval of the median is open: too few members relaxed".into()
         }
@@ -297,9 +297,6 @@ fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> Stri
     let advice = match () {
         () if not_asymptotic > 0 => format!("; {not_asymptotic} of them {unclear}: {remedy}"),
         () if spec.refine => "; t_limit is free of this error".into(),
-        () if larger && spec.has_vesicles_in(cell.cell) => {
-            "; more --points reduce this error, or --accurate in f64".into()
-        }
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => "; --refine removes this error".into(),
         () if larger => "; --accurate removes this error".into(),
         () => String::new(),

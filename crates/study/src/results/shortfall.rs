@@ -2,7 +2,7 @@
 
 use super::{EnsembleStatistics, cells::CellStatistics};
 use curvelax_base::text::{count, number, rounded, rounded_beside};
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, request::spec::Precision};
 
 /// Standard errors of a median of n times in half the 95 % interval, in shares of n: 1.96/2.
 const HALF_WIDTH: f64 = 0.98;
@@ -45,7 +45,7 @@ impl Shortfall {
 }
 
 fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
-    let points = spec.points;
+    let (points, finer) = (spec.points, finer(spec));
     match cell.uncertainty(of_each) {
         _ if cell.relaxing.times.median() == Some(0.0) => {
             "at least half of the members are relaxed at the start: use a larger --amplitude, or another --shape".into()
@@ -61,13 +61,11 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             rounded(rounding(cell), 2)
         ),
         Some(_) if of_each => {
-            format!("t_error is larger for some members at n = {points}: use more --points, or a larger --accuracy")
+            format!("t_error is larger for some members at n = {points}: {finer}")
         }
         Some((all, discretisation)) if 2.0 * discretisation > all => {
             let discretisation = rounded(discretisation, 2);
-            format!(
-                "{discretisation} of it is due to discretisation at n = {points}: use more --points, or a larger --accuracy"
-            )
+            format!("{discretisation} of it is due to discretisation at n = {points}: {finer}")
         }
         Some(_) => match needed(cell, goal) {
             Some(members) => format!(
@@ -76,6 +74,14 @@ fn why(spec: &Spec, cell: &CellStatistics, goal: f64, of_each: bool) -> String {
             ),
             None => "use more --curves to begin with".into(),
         },
+    }
+}
+
+/// What makes the error of each member smaller.
+fn finer(spec: &Spec) -> &'static str {
+    match spec.precision {
+        Some(Precision::F32) => "use --precision f64, more --points, or a larger --accuracy",
+        _ => "use more --points, or a larger --accuracy",
     }
 }
 
@@ -130,6 +136,8 @@ mod tests {
         assert_eq!(lacks(0.028, 0.1, 1e-5, None), None);
         let steps = "--accuracy 0.028: 0.057 was reached; 0.03 of it is due to discretisation at n = 100: use more --points, or";
         assert!(lacks(0.028, 0.1, 0.03, None).unwrap().starts_with(steps), "{:?}", lacks(0.028, 0.1, 0.03, None));
+        let short = Spec { precision: Some(Precision::F32), ..Spec::default() };
+        assert!(finer(&short).contains("f64") && !finer(&Spec::default()).contains("f64"));
         // Of outlines each member counts, and sampling is no error.
         assert_eq!(lacks(0.02, 0.1, 1e-3, Some(64)), None);
         let each = "--accuracy 0.02: 0.033 was reached; t_error is larger for some members at n = 100";

@@ -518,6 +518,9 @@ mod tests {
         alone.add(&late(0)).unwrap();
         let remedy = "use a longer --t-end or --t-end auto, or a larger --relax-to or --relax-at";
         assert_eq!(alone.warnings(), [format!("no member relaxed before its final time; {remedy}")]);
+        alone.supplement.below_rounding = 1;
+        assert!(matches!(&alone.warnings()[..], [hidden] if hidden.contains("rounding hides the threshold")));
+        alone.supplement.below_rounding = 0;
         alone.add(&outcome(1, Status::Relaxed, Some(0.5))).unwrap();
         assert_eq!(alone.warnings(), [""; 0]);
 

@@ -28,8 +28,11 @@ impl Tally {
             warnings.push(format!("{failed} of {members} failed (see `status`): {remedy}"));
         }
         warnings.extend(self.vanished());
-        warnings.extend(self.late());
         let TallySupplement { drifted: (drifted, worst), below_rounding, .. } = self.supplement;
+        // More time shows no threshold that rounding hides.
+        if self.cells.iter().map(|cell| cell.late).sum::<u64>() > below_rounding {
+            warnings.extend(self.late());
+        }
         if below_rounding > 0 {
             warnings.push(format!(
                 "{below_rounding} of {members} started so nearly round that rounding hides the threshold: t_relax cannot be \
