@@ -94,7 +94,7 @@ fn correct(old_x: vec, old_y: vec, by: Moves) {
         // Others may still read the last sums.
         workgroupBarrier();
         var lacks = due;
-        if IS_SHORT { lacks -= growth(old_x, old_y); } else { lacks -= sizes(new_x, new_y); }
+        if IS_SHORT { lacks -= change_of_sizes(old_x, old_y); } else { lacks -= sizes(new_x, new_y); }
         along += balanced(squares, lacks.x, lacks.y);
         let nodes = windows(
             moved(old_x, by.x + (along.x * ax + along.y * lx)), moved(old_y, by.y + (along.x * ay + along.y * ly)),
@@ -132,7 +132,7 @@ fn beyond_rounding(targets: vec2<real>, own: vec2<real>) -> vec2<real> {
 }
 
 /// By how much area and length of the new polygon exceed those of the old one, by how far its nodes have moved.
-fn growth(old_x: vec, old_y: vec) -> vec2<real> {
+fn change_of_sizes(old_x: vec, old_y: vec) -> vec2<real> {
     let half = real(0.5);
     let dx = apart(old_x, here(new_x));
     let dy = apart(old_y, here(new_y));

@@ -140,7 +140,7 @@ fn the_files_have_the_columns_of_the_manual() {
     );
     assert_eq!(
         header("levels.csv"),
-        "member,level,cell,points,adaptive,precision,status,t_relax,solves,turn,excess_start,t_vanish,length_start"
+        "member,level,cell,points,adaptive,precision,status,t_relax,solves,turn,excess_start,t_vanish,length_start,energy_start,energy_end"
     );
     assert_eq!(header("series.csv"), "member,t,length,area,excess,energy,k_min,k_max,mesh_ratio,metric_drift");
     assert_eq!(header("snapshots.csv"), "member,t,i,x,y,k,r");

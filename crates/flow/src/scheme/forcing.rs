@@ -155,7 +155,7 @@ pub fn correct<N: Number>(
     let due = if N::IS_SHORT { beyond_rounding(targets, sizes(old, blocks)) } else { targets };
     let mut along = [N::of(0.0); 2];
     for _ in 0..ROUNDS {
-        let [area, length] = if N::IS_SHORT { growth(old, new, blocks) } else { sizes(new.nodes(), blocks) };
+        let [area, length] = if N::IS_SHORT { change_of_sizes(old, new, blocks) } else { sizes(new.nodes(), blocks) };
         let found = balanced(kept, squares, [due[0] - area, due[1] - length]);
         along = [along[0] + found[0], along[1] + found[1]];
         for i in 0..new.len() {
@@ -205,7 +205,7 @@ fn beyond_rounding<N: Number>(targets: [N; 2], sizes: [N; 2]) -> [N; 2] {
 /// × (m_i + m_{i+1})` with the moves d and the means m of old and new edges, and `Σ (d_i - d_{i-1})·2m_i / (|e_i| +
 /// |e_i - (d_i - d_{i-1})|)`.
 #[inline(always)]
-fn growth<N: Number>([old_x, old_y]: [&Ring<N>; 2], new: &Curve<N>, blocks: Blocks) -> [N; 2] {
+fn change_of_sizes<N: Number>([old_x, old_y]: [&Ring<N>; 2], new: &Curve<N>, blocks: Blocks) -> [N; 2] {
     let half = N::of(0.5);
     let moves = |old: &Ring<N>, new: &Ring<N>, i| {
         let ([_, from_m, from, from_p, _], [_, m, x, p, _]) = (old.window(i), new.window(i));
