@@ -150,12 +150,8 @@ fn near(found: Option<f64>, exact: f64, bound: f64) -> bool {
 #[test]
 fn a_member_that_relaxed_stays_relaxed_whatever_happens_to_it_at_rest() {
     let omega = |rate| Some(OrAuto::Number(rate));
-    let spec = |omega, t_end: f64| Spec {
-        pull: OrAuto::Auto,
-        omega,
-        t_end: Some(t_end.into()),
-        ..adaptive("ellipse:2,1", 100)
-    };
+    let spec =
+        |omega, end: f64| Spec { pull: OrAuto::Auto, omega, t_end: Some(end.into()), ..adaptive("ellipse:2,1", 100) };
     let long = one(&spec(omega(1e-4), 20_000.0));
     assert_eq!(long.status, Status::Relaxed);
     assert!(long.t_end < 20_000.0, "it lost its mesh: {}", long.t_end);
