@@ -12,8 +12,8 @@ class Keys(TypedDict, total=False):
     """What ``curvelax.run`` takes; flags of ``curvelax run`` with ``_`` for ``-``."""
 
     curves: int
-    """Number of members: perturbed copies of the curve, or of each outline. Without the flag, several outlines, or
-    those of files:PATTERN, are one unperturbed member each. By default 256."""
+    """Number of members: perturbed copies of the curve, or of each outline. By default 256; for several outlines, or
+    those of files:PATTERN, one unperturbed member each."""
 
     outlines: int
     """Fail unless exactly this many outlines are read. The spec of a run records it. By default any number."""
@@ -102,8 +102,8 @@ class Keys(TypedDict, total=False):
 
     conserve: str
     """Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-    vesicle: it is relaxed from the time after which |E - E_end| stays below relax-to times its maximum over the run.
-    By default neither."""
+    vesicle, and its bending energy E = ½∮k² ds says when: from the time on after which |E - E_end| stays below
+    relax-to times its maximum over the run. By default neither."""
 
     conserve_at: Sequence[float]
     """The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are scaled
@@ -124,9 +124,9 @@ class Keys(TypedDict, total=False):
     SPEC.toml. By default off."""
 
     t_end: float | Literal["auto"] | Sequence[float]
-    """Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear theory
-    predicts for its cell; if drive makes it vanish, when it has. T1,T2,...: one for each cell of a sweep. By default
-    2."""
+    """Final time. auto: each member ends when it is relaxed, at the latest at six times the relaxation time that
+    linear theory predicts for its cell; a member that drive shrinks to a point ends there. T1,T2,...: one for each
+    cell of a sweep. By default 2."""
 
     omega: float | Literal["auto"]
     """Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member. By default 1
@@ -136,12 +136,12 @@ class Keys(TypedDict, total=False):
     """Move nodes along the normal only. By default false."""
 
     relax_to: float
-    """Count a member as relaxed at this fraction of its initial excess, or of the energy of a vesicle (conserve). By
-    default 0.01."""
+    """Count a member as relaxed when its excess, L^2/(4 pi A) minus that of the regular polygon, has fallen to this
+    fraction of its start; for vesicles see conserve. By default 0.01."""
 
     relax_at: float
-    """Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of relax-to.
-    Use it for rough outlines. By default off."""
+    """Count a member as relaxed when its excess has fallen to this value, instead of relax-to. Use it for rough
+    outlines, whose initial excess is that of their details. By default off."""
 
     stop_when_relaxed: bool
     """End a member as soon as it is relaxed; one that drive shrinks to a point ends there. Vesicles (conserve

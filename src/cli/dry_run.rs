@@ -38,7 +38,7 @@ fn table(estimate: &Estimate, spec: &Spec) -> String {
         ("members", format!("the run has {} in {cells} {}", count(*members, "member"), plural(*cells as u64, "cell"))),
         ("levels", levels(estimate, is_open)),
         ("back end", format!("it runs on {}; solver {}", machine(&estimate.platform), spec.solver().name())),
-        ("resident", format!("{} at once are in memory", count((*slots as u64).min(*members), "member"))),
+        ("resident", format!("memory holds up to {} at a time", count((*slots as u64).min(*members), "member"))),
         ("memory", format!("it needs about {}", bytes(estimate.memory_bytes))),
         ("disk", format!("its files take about {}", bytes(estimate.disk_bytes))),
         (
@@ -98,8 +98,8 @@ fn levels(
     };
     match *level_members {
         0 => "no member runs at other resolutions: the error of discretisation will be unknown".into(),
-        1 => format!("there is 1 more run at another resolution{finer}{varied}"),
-        runs => format!("there are {runs} more runs of members at other resolutions{finer}{varied}"),
+        1 => format!("discretisation is estimated from 1 further run at another resolution{finer}{varied}"),
+        runs => format!("discretisation is estimated from {runs} further runs at other resolutions{finer}{varied}"),
     }
 }
 
@@ -138,9 +138,9 @@ mod tests {
         };
         let expected = "\
 members    the run has 3000 members in 1 cell
-levels     there are 32 more runs of members at other resolutions
+levels     discretisation is estimated from 32 further runs at other resolutions
 back end   it runs on cpu, f64, 2 threads (asked for); solver gauss-seidel
-resident   128 members at once are in memory
+resident   memory holds up to 128 members at a time
 memory     it needs about 17 MB
 disk       its files take about 1.2 GB
 steps      each member takes about 2000 on average
@@ -153,7 +153,7 @@ pilot      130 members were started for this estimate, and 130 ended, in 1.40 s
         let dispatched = "dispatches there are about 740\nstart-up   it takes 0.01 s\ntime       the run takes about 31.9 s after start-up\n";
         assert!(on_gpu.contains(dispatched), "{on_gpu}");
         let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
-        let told = "levels     there are 32 more runs of members at other resolutions; about 12 members need more nodes, up to n = 1600\n";
+        let told = "levels     discretisation is estimated from 32 further runs at other resolutions; about 12 members need more nodes, up to n = 1600\n";
         assert!(table(&finer, &Spec::default()).contains(told));
         let varied = Estimate { varied_members: 8, ..finer };
         assert!(

@@ -175,8 +175,9 @@ mod tests {
                 toml::Value::Array(list) if list.is_empty() => "off".into(),
                 other => other.to_string(),
             };
-            let stated = stated.split_once(" with --").map_or(stated, |(stated, _)| stated);
-            assert_eq!(stated, expected, "{argument}");
+            let stated =
+                [" with --", "; "].into_iter().fold(stated, |text, end| text.split(end).next().unwrap_or(text));
+            assert_eq!(stated, expected, "--{}", argument.get_id());
         }
     }
 

@@ -20,7 +20,7 @@ const EXAMPLES: &str = "\
 Examples:
   curvelax merge shards/* --out study
   curvelax merge shards/* --missing
-      shards that are not finished, and the line that submits them to Slurm again
+      shards that are not finished, and the command that submits them to Slurm again
 
 The files are those that one run without --shard would have written, byte for byte except the times and the
 number of threads in run.json. Shards that are missing, unfinished, duplicated or modified are rejected by name, and so are
@@ -39,10 +39,10 @@ pub struct MergeArgs {
     /// Write into an existing --out DIR, replacing the earlier run in it. A folder that holds anything else is refused
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
-    /// Print the missing shards and the line that submits them to Slurm, and stop
+    /// Print the missing shards and the command that submits them to Slurm, and stop
     #[arg(long, conflicts_with_all = ["out", "force", "json"], help_heading = flags::OUTPUT)]
     missing: bool,
-    /// The job script in that line
+    /// The job script in that command
     #[arg(long, value_name = "FILE", default_value = "array.sh", requires = "missing", help_heading = flags::OUTPUT)]
     script: PathBuf,
     /// Print no table: only errors, and the results if --json is given

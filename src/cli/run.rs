@@ -23,7 +23,7 @@ Examples:
   curvelax run --curves 8 --tau 1e-4 --print-spec > spec.toml
   curvelax run spec.toml --seed 2 --out second
   curvelax run spec.toml --shard 3/8 --resume --out shards/3
-      an eighth of the members, for curvelax merge; the same line resumes it after an interruption
+      an eighth of the members, for curvelax merge; the same command resumes it after an interruption
   curvelax run spec.toml --dry-run
 
 Distributions, for any number in --shape, --flow, --energy, --diffusivity, --drive, --amplitude, --decay and
@@ -53,7 +53,7 @@ pub struct RunArgs {
     #[arg(long, help_heading = flags::OUTPUT)]
     force: bool,
     /// Resume the run in DIR if it was interrupted, leave it if it is finished, start it if there is none. The same
-    /// line then starts and restarts a job
+    /// command then starts and restarts a job
     #[arg(long, conflicts_with_all = ["force", "dry_run", "print_spec"], help_heading = flags::OUTPUT)]
     resume: bool,
     #[command(flatten)]

@@ -130,6 +130,21 @@ fn a_curve_vanishes_before_the_circle_of_its_area_and_its_events_are_seen() {
 }
 
 #[test]
+fn a_curve_whose_sides_meet_before_it_is_round_is_singular_and_does_not_vanish() {
+    let status = |force: f64| {
+        let done = run(&format!(
+            "--shape ellipse:5,1 --drive {force} --amplitude 0 --curves 1 --adaptive --pull auto --t-end auto"
+        ));
+        let row = &done.summary()[0];
+        (row["status"].clone(), row["t_vanish"].is_empty(), row["self_crossing"].is_empty())
+    };
+    assert_eq!(status(0.2), ("vanished".into(), false, true));
+    // It crosses itself for a while, and is round at the end.
+    assert_eq!(status(2.0), ("vanished".into(), false, false));
+    assert_eq!([3.0, 5.0].map(status), [("singular".into(), true, false), ("singular".into(), true, false)]);
+}
+
+#[test]
 fn the_overview_says_that_members_that_relaxed_vanished_afterwards() {
     let home = TempDir::new().unwrap();
     let told = |drive: &str| {

@@ -142,7 +142,7 @@ fn only_rough_members_get_more_nodes_and_their_limit_rests_on_them() {
         assert!(number::<f64>(row, "t_error") < 1e-2 * number::<f64>(row, "t_limit"), "{row:?}");
         most = most.max(points);
     }
-    assert!(told.contains(&format!("{count} of 12 members needed more nodes, up to n = {most}")), "{told}");
+    assert!(told.contains(&format!("{count} of 12 members needed more nodes for t_limit, up to {most}")), "{told}");
     // Those of the events are at the same levels.
     assert_eq!(levels, self::levels(&out.join("event_levels.csv")));
     // Without --refine there is nothing finer than the member.

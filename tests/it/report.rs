@@ -261,9 +261,9 @@ fn the_page_says_which_members_were_smoothed() {
     let wedge = [("wedge.csv", "0,0\n3,-1\n3,1\n")];
     let rounded = run_with(&wedge, "--curves 2 --shape file:wedge.csv --tau 1e-7 --t-end 2e-7 --solver direct");
     let page = rounded.text("report.html");
-    assert!(page.contains("2 members were smoothed until the nodes resolved") && page.contains(" % and was restored."));
+    assert!(page.contains("corners of 2 members were rounded further") && page.contains(" % and was restored."));
     let untouched = run("--curves 2 --tau 1e-7 --t-end 2e-7 --solver direct").text("report.html");
-    assert!(!untouched.contains("smoothed until"));
+    assert!(!untouched.contains("rounded further"));
 }
 
 #[test]

@@ -28,7 +28,7 @@ columns! { Outcome, names::SUMMARY:
     rejected: whole = rejected, "adaptive steps that were refused";
     sweeps_k: whole = sweeps_k, "Gauss-Seidel sweeps on the curvature systems, 0 with the direct solver";
     sweeps_x: whole = sweeps_x, "Gauss-Seidel sweeps on the position systems";
-    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, interpolated inside the step; with `--conserve area,length` the time after which |E - E_end| stays below `relax-to` times its maximum over the run, empty if E returns close to this threshold";
+    t_relax: event = t_relax, "first time at which the excess reaches `relax-to` times its start, or `relax-at`, and k agrees with the polygon, interpolated inside the step; with `--conserve area,length` the time after which |E - E_end| stays below `relax-to` times its maximum over the run, empty if E returns close to this threshold";
     t_half: event = t_half, "first time at which the excess reaches half its start; with `--conserve area,length` likewise by the energy";
     rate: optional = rate, "slope of -ln excess against time while the excess falls from a tenth to a thousandth of its start; for Willmore flow against ln(1 + 2t/R₀⁴); empty below 8 points";
     rate_r2: optional = rate_r2, "share of the variance of ln excess that the line explains";
@@ -36,7 +36,7 @@ columns! { Outcome, names::SUMMARY:
     length_end: number = end.length, "length of the last polygon";
     area_start: number = start.area, "signed area of the initial polygon, positive counter-clockwise";
     area_end: number = end.area, "signed area of the last polygon";
-    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one; of a crystal E²/(4|W|A) above its Wulff shape";
+    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one; of a crystal E²/(4|W|A) minus that of n nodes on its Wulff shape, |W| being the area at which γ is its support function";
     excess_end: number = end.excess, "the same of the last polygon";
     energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic; of a crystal ∮γ ds";
     energy_end: number = end.energy, "the same at the end";

@@ -44,6 +44,8 @@ pub struct SpecKey {
     pub takes: Takes,
     /// What its flag means without a value, if that is allowed.
     pub missing: Option<&'static str>,
+    /// Whether it is the same in every cell: it cannot be swept.
+    is_common: bool,
     /// Whether one word can be its value, or a part of it; else what is wrong with it.
     pub check: fn(&str) -> Result<(), String>,
     /// Replaces its value by that of the words of its flag.
@@ -82,8 +84,8 @@ fn check<T: Value>(word: &str, _: fn(&Spec) -> &T) -> Result<(), String> {
 }
 
 /// Defines the spec, its default, and [`Spec::table`] from a table with lines `key: TYPE = DEFAULT, "VALUE", HEADING;`
-/// whose comments are the help. A `key?: TYPE` has no value unless it is given. `or "TEXT"` is the value of
-/// a flag without one. What is no key follows.
+/// whose comments are the help. A `key?: TYPE` has no value unless it is given. A key for `every cell` has one value in
+/// all of them: it cannot be swept. `or "TEXT"` is the value of a flag without one. What is no key follows.
 macro_rules! keys {
     (
         $(#[$of_spec:meta])*
@@ -91,7 +93,7 @@ macro_rules! keys {
             $(
                 $(#[doc = $help:literal])+ $(#[serde($($serde:tt)*)])?
                 $key:ident $(?: $some:ty)? $(: $type:ty = $default:expr)?,
-                $value:literal, $heading:ident $(, or $missing:literal)?;
+                $value:literal, $heading:ident $(, every $cell:ident)? $(, or $missing:literal)?;
             )*
         }
         besides {
@@ -124,6 +126,7 @@ macro_rules! keys {
                 help: concat!($($help, "\n",)+),
                 takes: takes(|spec| &spec.$key),
                 missing: [$($missing)?].first().copied(),
+                is_common: !<[&str]>::is_empty(&[$(stringify!($cell))?]),
                 check: |word| check(word, |spec| &spec.$key),
                 set: |spec, words| {
                     Value::put(&mut spec.$key, Value::of(words)?);
@@ -144,14 +147,14 @@ keys! {
     #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
     #[allow(rustdoc::broken_intra_doc_links)] // the brackets of a grammar
     pub struct Spec {
-        /// Number of members: perturbed copies of the curve, or of each outline. Without the flag, several outlines, or
-        /// those of files:PATTERN, are one unperturbed member each [default: 256]
-        curves: u64 = 256, "COUNT", ENSEMBLE;
+        /// Number of members: perturbed copies of the curve, or of each outline [default: 256; for several outlines, or
+        /// those of files:PATTERN, one unperturbed member each]
+        curves: u64 = 256, "COUNT", ENSEMBLE, every cell;
         /// Fail unless exactly this many outlines are read. The spec of a run records it [default: any number]
-        outlines?: u64, "COUNT", ENSEMBLE;
+        outlines?: u64, "COUNT", ENSEMBLE, every cell;
         /// Compare the outlines by the values of this property of their features, column of their table, or `file`
         /// [default: no groups]
-        group_by?: String, "PROPERTY", ENSEMBLE;
+        group_by?: String, "PROPERTY", ENSEMBLE, every cell;
         /// Nodes per member, n ≥ 6 [default: 100]
         points: usize = 100, "N", ENSEMBLE;
         /// Seed of the random perturbations [default: 1]
@@ -204,8 +207,8 @@ keys! {
         /// number may be a distribution [default: 0]
         drive?: Drawn<Drive>, "F", EVOLUTION;
         /// Keep the area, the length, or area,length, of willmore, elastic and poly. With both a curve relaxes to a
-        /// vesicle: it is relaxed from the time after which |E - E_end| stays below --relax-to times its maximum over
-        /// the run [default: neither]
+        /// vesicle, and its bending energy E = ½∮k² ds says when: from the time on after which |E - E_end| stays below
+        /// --relax-to times its maximum over the run [default: neither]
         conserve?: Conserved, "WHAT", EVOLUTION;
         /// The area and the length that are kept; one number if one is. Starts that are off by more than 0.4 % are
         /// scaled to it, and for both first stretched as by --reduced-area [default: those of the polygon at the start]
@@ -215,15 +218,15 @@ keys! {
         /// results, are then in its unit of time [default: 1]
         mobility?: f64, "B", EVOLUTION;
         /// Names of the units of length and time, such as um,h, for the report and the axes [default: none]
-        units?: Units, "LENGTH,TIME", EVOLUTION;
+        units?: Units, "LENGTH,TIME", EVOLUTION, every cell;
         /// Fixed time step τ. auto is R^4/4000 for each member [default: 0.001]
         tau?: OrAuto, "TAU", EVOLUTION;
         /// Adapt the steps to this local error instead of using --tau. Without TOL it is 0.001; write --adaptive=TOL
         /// before SPEC.toml [default: off]
         adaptive?: f64, "TOL", EVOLUTION, or "0.001";
-        /// Final time. auto: when the member is relaxed, at the latest at six times the relaxation time that linear
-        /// theory predicts for its cell; if --drive makes it vanish, when it has. T1,T2,...: one for each cell of a
-        /// sweep [default: 2]
+        /// Final time. auto: each member ends when it is relaxed, at the latest at six times the relaxation time that
+        /// linear theory predicts for its cell; a member that --drive shrinks to a point ends there. T1,T2,...: one for
+        /// each cell of a sweep [default: 2]
         t_end?: FinalTime, "T", EVOLUTION;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
         /// [default: 1 with --tau, auto with --adaptive and --tau auto]
@@ -251,68 +254,68 @@ keys! {
         /// [default: 1; auto with --adaptive]
         sor?: OrAuto, "FACTOR", METHOD;
         /// Maximum Gauss-Seidel sweeps per system; a member that needs more ends as `stalled` [default: 200000]
-        max_sweeps: u32 = 200_000, "COUNT", METHOD;
+        max_sweeps: u32 = 200_000, "COUNT", METHOD, every cell;
         /// Where to run; auto uses a hardware GPU if there is one, otherwise the CPU [default: auto]
-        backend: BackendChoice = BackendChoice::Auto, "WHERE", MACHINE;
+        backend: BackendChoice = BackendChoice::Auto, "WHERE", MACHINE, every cell;
         /// GPU adapter to use: part of its name, or its number in `curvelax adapters` [default: the best]
-        adapter?: String, "NAME", MACHINE;
+        adapter?: String, "NAME", MACHINE, every cell;
         /// Number type [default: f64 where the device has it]
-        precision?: Precision, "TYPE", MACHINE;
-        /// Count a member as relaxed at this fraction of its initial excess, or of the energy of a vesicle (--conserve)
-        /// [default: 0.01]
+        precision?: Precision, "TYPE", MACHINE, every cell;
+        /// Count a member as relaxed when its excess, L^2/(4 pi A) minus that of the regular polygon, has fallen to
+        /// this fraction of its start; for vesicles see --conserve [default: 0.01]
         relax_to?: f64, "FRACTION", EVOLUTION;
-        /// Count a member as relaxed at this excess, L^2/(4 pi A) minus that of the regular polygon, instead of
-        /// --relax-to. Use it for rough outlines [default: off]
+        /// Count a member as relaxed when its excess has fallen to this value, instead of --relax-to. Use it for rough
+        /// outlines, whose initial excess is that of their details [default: off]
         relax_at?: f64, "EXCESS", EVOLUTION;
         /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there. Vesicles (--conserve
         /// area,length) run to the final time [default: false; with --t-end auto true]
-        stop_when_relaxed?: bool, "BOOL", EVOLUTION;
+        stop_when_relaxed?: bool, "BOOL", EVOLUTION, every cell;
         /// Run every member also with n/2, n/√2 and n nodes and a tenth of the step tolerance, and extrapolate t_relax
         /// to n → ∞: columns t_limit, t_error, order and points of summary.csv; with --drive t_vanish, too:
         /// t_vanish_limit and t_vanish_error. Members whose times do not converge there also run with √2 n, 2n, … up to
         /// 1600 nodes [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
-        refine: bool = false, "BOOL", EVOLUTION;
+        refine: bool = false, "BOOL", EVOLUTION, every cell;
         /// With --refine or --accurate: choose n, the tolerance and the number of members so that the 95 % interval of
         /// the median t_limit, for sampling and discretisation together, is within X times the median. For outlines,
         /// whose number is given: n and the tolerance so that each t_error is within X times t_limit. It starts from
         /// --curves, --points and --adaptive. If X cannot be reached, the run keeps its best result and exits with code
         /// 3 [default: off]
-        accuracy?: f64, "X", EVOLUTION;
+        accuracy?: f64, "X", EVOLUTION, every cell;
         /// Write events.csv: the first time at which each member meets a condition, NAME=OBSERVABLE<=THRESHOLD, or with
         /// >=. A threshold is a number, or FACTOR*start. Observables are length, area, excess, energy, k_min, k_max,
         /// mesh_ratio (longest over shortest segment) and metric_drift (largest relative difference between the lengths
         /// r that the scheme evolves and those of the segments). For several events give it several times: --event
         /// 'convex = k_min >= 0' --event 'slow = excess <= 0.5 * start' [default: none]
         #[serde(skip_serializing_if = "Vec::is_empty")]
-        event: Vec<Event> = Vec::new(), "NAME=CONDITION", OUTPUT;
+        event: Vec<Event> = Vec::new(), "NAME=CONDITION", OUTPUT, every cell;
         /// Write series.csv: one row per member every DT [default: off]
-        series?: f64, "DT", OUTPUT;
+        series?: f64, "DT", OUTPUT, every cell;
         /// Write snapshots.csv: all nodes at these times [default: off]
         #[serde(deserialize_with = "list")]
-        snapshots: Vec<f64> = Vec::new(), "T1,T2,...", OUTPUT;
+        snapshots: Vec<f64> = Vec::new(), "T1,T2,...", OUTPUT, every cell;
         /// Format of the snapshots: the table snapshots.csv, or the arrays of snapshots.zarr, for xarray
         /// [default: csv]
-        store: Store = Store::Csv, "HOW", OUTPUT;
+        store: Store = Store::Csv, "HOW", OUTPUT, every cell;
         /// Format of the tables: CSV, or Parquet next to the CSV files, which the other commands read [default: csv]
         #[serde(skip_serializing_if = "Tables::is_csv")]
-        tables: Tables = Tables::Csv, "HOW", OUTPUT;
+        tables: Tables = Tables::Csv, "HOW", OUTPUT, every cell;
         /// Run only these members; each is bit-identical to its run in the whole ensemble [default: all]
         #[serde(deserialize_with = "some_list")]
-        only?: Vec<u64>, "J1,J2,...", ENSEMBLE;
+        only?: Vec<u64>, "J1,J2,...", ENSEMBLE, every cell;
         /// Run only the members j with j mod N = I, for `curvelax merge`; `slurm` reads I/N from the job array
         /// [default: all]
-        shard?: Shard, "I/N", ENSEMBLE;
+        shard?: Shard, "I/N", ENSEMBLE, every cell;
         /// Threads that prepare and analyse members and, on the CPU, advance them [default: all cores]
-        threads?: usize, "COUNT", MACHINE;
+        threads?: usize, "COUNT", MACHINE, every cell;
         /// Draw member j of every cell from the same random numbers [default: false]
         #[serde(skip_serializing_if = "std::ops::Not::not")]
-        common_random_numbers: bool = false, "BOOL", ENSEMBLE;
+        common_random_numbers: bool = false, "BOOL", ENSEMBLE, every cell;
         /// Vary this key: a cell of members for each value, or for each combination of values if the flag is given for
         /// several keys. Separate values that contain commas by semicolons: --sweep 'shape=ellipse:2,1;circle:1'
         /// [default: none]
         #[serde(skip_serializing_if = "Sweep::is_empty")]
-        sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", ENSEMBLE;
+        sweep: Sweep = Sweep::default(), "KEY=V1,V2,...", ENSEMBLE, every cell;
     }
     besides {
         /// Highest order of adaptive steps; if absent, that of the precision. Only the study of work and precision sets
@@ -327,6 +330,11 @@ impl Spec {
     /// Names of all keys, in order.
     pub fn keys() -> Vec<String> {
         Self::table().iter().map(|key| key.name.clone()).collect()
+    }
+
+    /// Whether `key` is the same in every cell: it cannot be swept.
+    pub(super) fn is_common(key: &str) -> bool {
+        Self::table().iter().any(|known| known.name == key && known.is_common)
     }
 }
 

@@ -14,30 +14,6 @@ use toml::Value;
 use super::choices::number;
 use curvelax_base::error::{Error, Result, did_you_mean, echo, shortened};
 
-/// Keys that all members of a run have in common.
-const COMMON: [&str; 21] = [
-    "curves",
-    "outlines",
-    "group-by",
-    "backend",
-    "adapter",
-    "precision",
-    "threads",
-    "event",
-    "series",
-    "snapshots",
-    "store",
-    "tables",
-    "only",
-    "shard",
-    "sweep",
-    "common-random-numbers",
-    "stop-when-relaxed",
-    "refine",
-    "accuracy",
-    "max-sweeps",
-    "units",
-];
 /// Keys of which each replaces the other.
 pub const EXCLUSIVE: [[&str; 2]; 2] = [["tau", "adaptive"], ["relax-to", "relax-at"]];
 /// More cells than this are a typing error.
@@ -256,12 +232,12 @@ impl Sweep {
         }
     }
 
-    /// Checks that the keys are among `keys`, and the numbers of values. The values themselves are checked cell by
-    /// cell.
+    /// Checks that the keys are among `keys` and not the same in every cell, and the numbers of values. The values
+    /// themselves are checked cell by cell.
     ///
     /// # Errors
     /// [`Error::Request`] for a key that is unknown, cannot vary or has no values, and for too many cells.
-    pub fn check(&self, keys: &[String]) -> Result<()> {
+    pub fn check(&self, keys: &[String], is_common: impl Fn(&str) -> bool) -> Result<()> {
         for (i, SweepAxis { key, values }) in self.0.iter().enumerate() {
             let shown = echo(key);
             if !keys.contains(key) {
@@ -270,7 +246,7 @@ impl Sweep {
                     "--sweep {shown}: no such key{hint}; see --print-spec for the keys"
                 )));
             }
-            if COMMON.contains(&key.as_str()) {
+            if is_common(key) {
                 let message = "it is the same for the whole run; run once for each value";
                 return Err(Error::Request(format!("--sweep {shown}: {message}")));
             }
@@ -363,7 +339,7 @@ mod tests {
     #[test]
     fn cells_are_the_cross_product_with_the_last_key_fastest() {
         let sweep = sweep(&["shape=ellipse:2,1;circle:1", "amplitude=0.1,1"]);
-        sweep.check(&Spec::keys()).unwrap();
+        sweep.check(&Spec::keys(), Spec::is_common).unwrap();
         assert_eq!(sweep.cells(), 4);
         let names: Vec<String> = (0..4).map(|cell| sweep.name(cell)).collect();
         assert_eq!(
@@ -440,14 +416,16 @@ mod tests {
             (&["amplitude="], "--sweep amplitude: no values"),
             (&["seed=1,2,3,4,5,6,7,8,9,10", "decay=1,2,3,4,5,6,7,8,9,10"], ""),
         ] {
-            match sweep(axes).check(&Spec::keys()) {
+            match sweep(axes).check(&Spec::keys(), Spec::is_common) {
                 Err(error) => assert!(!part.is_empty() && error.to_string().contains(part), "{error}"),
                 Ok(()) => assert_eq!(part, "", "{axes:?}"),
             }
         }
         let thousand = format!("seed={}", (0..1000).map(|i| i.to_string()).collect::<Vec<_>>().join(","));
-        let many =
-            sweep(&[&thousand, &thousand.replace("seed", "omega")]).check(&Spec::keys()).unwrap_err().to_string();
+        let many = sweep(&[&thousand, &thousand.replace("seed", "omega")])
+            .check(&Spec::keys(), Spec::is_common)
+            .unwrap_err()
+            .to_string();
         assert!(many.contains("--sweep (1000000 cells): too many; at most 10000"), "{many}");
         let wrong = of_cell(&sweep(&["amplitude=0.1,word"]), &Spec::default(), 1).unwrap_err().to_string();
         assert!(wrong.starts_with("--sweep amplitude=word: "), "{wrong}");

@@ -47,7 +47,7 @@ const MAX_THREADS: u64 = 1024;
 impl Spec {
     /// Checks all ranges and combinations, and returns the spec with its lists sorted and without duplicates.
     pub fn validate(mut self) -> Result<Spec> {
-        self.sweep.check(&Spec::keys())?;
+        self.sweep.check(&Spec::keys(), Spec::is_common)?;
         self.check_counts()?;
         self.check_accuracy()?;
         self.check_mobility()?;

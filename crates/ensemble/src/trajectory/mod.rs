@@ -23,6 +23,7 @@ use watch::{Watch, aim_at_levels};
 use crate::{
     Member, Observables, Paused, Status,
     schedule::{Clock, Outputs, Ticks},
+    theory::vanishing::LITTLE_EXCESS,
 };
 use curvelax_base::error::{Error, Result};
 use curvelax_flow::{
@@ -212,7 +213,11 @@ impl Trajectory<'_> {
         let now = Observables::new(&self.at.report.now, 1.0, self.unit);
         let at = &self.at.report.now;
         let due = |own: &mut Vanishing| self.at.counters.status == 0 && own.is_due(at) && !own.is_put_off(at);
-        if let Some(own) = self.vanishing.take_if(due) {
+        // Sides that have met end the flow: what is left has not the life of a circle.
+        let met = at.excess > LITTLE_EXCESS && (self.at.crossed.is_some() || now.area * self.start.area <= 0.0);
+        if met && self.vanishing.as_mut().is_some_and(due) {
+            self.at.counters.status = Status::Singular as u32;
+        } else if let Some(own) = self.vanishing.take_if(due) {
             self.t_vanish = self.vanishes_at(&own, &now);
             if self.t_vanish.is_some() {
                 self.at.counters.status = Status::Vanished as u32;

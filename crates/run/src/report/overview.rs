@@ -57,7 +57,7 @@ impl fmt::Display for Overview<'_> {
         for (label, text) in [
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("outlines", self.tally.supplement.mollified.outlines().unwrap_or_default()),
-            ("smoothing", self.tally.supplement.mollified.smoothing().unwrap_or_default()),
+            ("rounding", self.tally.supplement.mollified.smoothing().unwrap_or_default()),
             (self.statistics.time(), self.relaxation()),
             ("t_relax", self.raw()),
             ("sampling", sampling),
@@ -412,8 +412,13 @@ results    out: summary.csv, run.json
             tally.add(&Outcome { judged, points, is_finer: points > 100, ..outcome }).unwrap();
             nodes(&tally)
         };
-        let bound = |all: u64| Some(format!("is only an upper bound for 1 of {all} members"));
-        let more = |finer: u64, all: u64| Some(format!("{finer} of {all} members needed more nodes, up to n = 283"));
+        let bound = |all: u64| {
+            Some(format!(
+                "is conservative for 1 of {all} members: their times at different n show no order of convergence"
+            ))
+        };
+        let more =
+            |finer: u64, all: u64| Some(format!("{finer} of {all} members needed more nodes for t_limit, up to 283"));
         assert_eq!(add(0, 100, true), [None, None]);
         assert_eq!(add(1, 100, false), [None, bound(2)]);
         assert_eq!(add(2, 283, true), [more(1, 3), bound(3)]);

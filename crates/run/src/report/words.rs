@@ -62,7 +62,7 @@ pub fn describe(spec: &Spec) -> String {
         ("mobility", mobility(spec)),
         ("points", format!("n = {}", spec.points)),
         pace,
-        ("t-end", format!("t-end = {}", in_time(&spec.t_end.clone().unwrap_or(spec.final_time().into()), &time))),
+        ("t-end", final_time(spec, &time)),
         ("seed", format!("seed {}", spec.seed)),
     ];
     let swept = |key: &str| spec.sweep.has(key);
@@ -75,11 +75,12 @@ pub fn describe(spec: &Spec) -> String {
     parts.collect::<Vec<_>>().join(", ")
 }
 
-/// A final time with its unit, if it is a number.
-fn in_time(t_end: &FinalTime, unit: &str) -> String {
-    match t_end {
-        FinalTime::At(_) => format!("{t_end}{unit}"),
-        _ => t_end.to_string(),
+/// The final time with its unit, if it is a number; the latest one if members end when they are relaxed.
+fn final_time(spec: &Spec, unit: &str) -> String {
+    match spec.t_end.clone().unwrap_or(spec.final_time().into()) {
+        t_end @ FinalTime::At(_) if spec.stops_when_relaxed() => format!("t-end ≤ {t_end}{unit}"),
+        t_end @ FinalTime::At(_) => format!("t-end = {t_end}{unit}"),
+        t_end => format!("t-end = {t_end}"),
     }
 }
 
@@ -281,7 +282,7 @@ fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> Stri
     if !discretisation.converges() {
         return match limits.as_ref().and_then(|limits| limits.error) {
             Some(bound) => format!(
-                "the median t_error, {}, is an upper bound: {not_asymptotic} of {members} {known} {unclear}",
+                "the median t_error, {}, is conservative: {not_asymptotic} of {members} {known} {unclear}",
                 significant(bound)
             ),
             None => format!(
@@ -323,7 +324,9 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
             Some(fit) => format!("median {time} scales as {scale} to the power {exponent}; {fit}"),
             None => {
                 let why = if count < 3 { "with two cells" } else { "without sampling errors" };
-                format!("median {time} scales as {scale} to the power {exponent}; {why} this cannot be tested")
+                format!(
+                    "median {time} scales as {scale} to the power {exponent}; {why} the power law itself cannot be tested"
+                )
             }
         }
     });
@@ -424,8 +427,14 @@ mod tests {
         let rejected = "median t_relax does not follow a power law in amplitude (chi2 = 12.50 with 3 degrees of freedom, p = 1.0e-7); the nearest exponent is -0.2500, \
                         standard error 0.01000";
         assert_eq!(law(&of(Some(1e-7), 5), "t_relax"), [rejected]);
-        assert_eq!(law(&of(None, 2), "t_relax"), [format!("{holds}; with two cells this cannot be tested")]);
-        assert_eq!(law(&of(None, 4), "t_relax"), [format!("{holds}; without sampling errors this cannot be tested")]);
+        assert_eq!(
+            law(&of(None, 2), "t_relax"),
+            [format!("{holds}; with two cells the power law itself cannot be tested")]
+        );
+        assert_eq!(
+            law(&of(None, 4), "t_relax"),
+            [format!("{holds}; without sampling errors the power law itself cannot be tested")]
+        );
         let none = Scaling { law: None, left_out: vec![(3, "its median is 0")], ..of(None, 0) };
         let lines = [
             "no power of amplitude is fitted: too few cells have a median",

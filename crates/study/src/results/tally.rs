@@ -490,8 +490,8 @@ mod tests {
         assert_eq!(tally.supplement.mollified.smoothing(), None);
         tally.add_supplement(&well, false);
         assert_eq!((tally.warnings(), tally.supplement.mollified.members), (vec![], 1));
-        let words = "1 member was smoothed until the nodes resolved it (at most 7 rounds): the area changed by at most 5.0 % and was \
-                     restored";
+        let words = "corners of 1 member were rounded further, until its n nodes resolved them: the area changed by at most 5.0 % \
+                     and was restored";
         assert_eq!(tally.supplement.mollified.smoothing().as_deref(), Some(words));
         tally.add_supplement(&Mollified { crossed: true, sharp: true, ..well }, false);
         tally.add_supplement(&Mollified { area_change: -0.2, ..well }, false);

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use curvelax_base::text::{plural, significant};
+use curvelax_base::text::{count, plural, significant};
 use curvelax_ensemble::{Mollified, Outcome, Treated, member::mollifier::MAX_VERTEX_TURN};
 
 /// How corners of members were rounded off (`ensemble/mollifier.rs`).
@@ -97,16 +97,15 @@ impl MollifiedMembers {
 
     /// What was done for their nodes, as a sentence without its stop; `None` if nothing was.
     pub fn smoothing(&self) -> Option<String> {
-        let MollifiedMembers { members, most_rounds, largest_area_change, crossed, distorted, .. } = *self;
+        let MollifiedMembers { members, largest_area_change, crossed, distorted, .. } = *self;
         // Of those two kinds some are left with another area.
         let restored = if crossed + distorted == 0 { " and was restored" } else { "" };
         (members > 0).then(|| {
             format!(
-                "{} smoothed until the nodes resolved {} (at most {most_rounds} {}): the area changed by at most {} \
+                "corners of {} were rounded further, until {} n nodes resolved them: the area changed by at most {} \
                  %{restored}",
-                if members == 1 { "1 member was".into() } else { format!("{members} members were") },
-                if members == 1 { "it" } else { "them" },
-                plural(most_rounds.into(), "round"),
+                count(members, "member"),
+                if members == 1 { "its" } else { "their" },
                 significant(100.0 * largest_area_change, 2)
             )
         })
@@ -166,12 +165,17 @@ impl FinerMembers {
     pub fn in_words(&self) -> Option<String> {
         let FinerMembers { judged, finer, most, .. } = *self;
         let all = plural(judged, "member");
-        (finer > 0).then(|| format!("{finer} of {judged} {all} needed more nodes, up to n = {most}"))
+        (finer > 0).then(|| format!("{finer} of {judged} {all} needed more nodes for t_limit, up to {most}"))
     }
 
     /// Of how many the error is only a bound; `None` if it is of none.
     pub fn bounds_in_words(&self) -> Option<String> {
         let FinerMembers { judged, bounds, .. } = *self;
-        (bounds > 0).then(|| format!("is only an upper bound for {bounds} of {judged} {}", plural(judged, "member")))
+        (bounds > 0).then(|| {
+            format!(
+                "is conservative for {bounds} of {judged} {}: their times at different n show no order of convergence",
+                plural(judged, "member")
+            )
+        })
     }
 }

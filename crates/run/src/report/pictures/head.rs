@@ -26,11 +26,11 @@ const MAX_TITLE: usize = 90;
 impl FinishedRun<'_> {
     /// What the page says first.
     pub fn head(&self) -> PageHead {
-        let smoothing = self.tally.supplement.mollified.smoothing().map_or(String::new(), |text| format!(" {text}."));
+        let smoothing = self.tally.supplement.mollified.smoothing().map_or(String::new(), |text| format!("; {text}"));
         PageHead {
             title: self.title(),
             what: format!(
-                "{}, {}.{smoothing} {}",
+                "{}, {}{smoothing}. {}",
                 count(self.tally.members(), "member"),
                 self.what(),
                 self.about_times()
@@ -205,7 +205,7 @@ impl FinishedRun<'_> {
             (time_unit(self.spec()), cell.relaxing.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
         let bound = match open {
             0 => "half-width of the 95 % interval of each t_limit".into(),
-            _ => format!("only an upper bound for {}", count(open as u64, "member")),
+            _ => format!("conservative for {}", count(open as u64, "member")),
         };
         let shown = |value: f64, digits: usize| format!("{}{unit}", significant(value, digits));
         let error = cell.relaxing.limits.as_ref().and_then(|limits| limits.error);
