@@ -39,7 +39,7 @@ Examples:
   curvelax convergence --referee --curves 100 --seed 2 --out referee
 
 An error is measured/exact - 1. In n, with tau proportional to 1/n^2, the order should be 2. In tau, at a fixed n, it
-should be 1. In the length of adaptive steps, proportional to the root of their tolerance, it should be 2. The last two are
+should be 1. In the tolerance of adaptive steps it is about 1, and scatters, as steps have several orders. The last two are
 orders of the differences of three errors, which cancels the error of the spacing. No order is printed where the error changes
 by rounding only.
 

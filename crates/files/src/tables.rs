@@ -36,7 +36,7 @@ columns! { Outcome, names::SUMMARY:
     length_end: number = end.length, "length of the last polygon";
     area_start: number = start.area, "signed area of the initial polygon, positive counter-clockwise";
     area_end: number = end.area, "signed area of the last polygon";
-    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one; of a crystal E²/(4|W|A) minus that of n nodes on its Wulff shape, |W| being the area at which γ is its support function";
+    excess_start: number = start.excess, "L²/(4πA) - (n/π)·tan(π/n) of the initial polygon, 0 on a regular one; of a crystal E²/(4|W|A) minus that of n nodes on its Wulff shape, |W| being the area of the one whose support function is γ";
     excess_end: number = end.excess, "the same of the last polygon";
     energy_start: number = start.energy, "∮(½k² + λ) ds at the start; λ is 0 unless the flow is elastic; of a crystal ∮γ ds";
     energy_end: number = end.energy, "the same at the end";
@@ -117,8 +117,8 @@ columns! { SeriesRow, names::SERIES:
     t: time = t, "time";
     length: number = at.length, "length of the polygon";
     area: number = at.area, "signed area of the polygon";
-    excess: number = at.excess, "L²/(4πA) - (n/π)·tan(π/n)";
-    energy: number = at.energy, "∮(½k² + λ) ds";
+    excess: number = at.excess, "as in `summary.csv`";
+    energy: number = at.energy, "as in `summary.csv`";
     k_min: number = at.k_min, "smallest curvature";
     k_max: number = at.k_max, "largest curvature";
     mesh_ratio: number = at.mesh_ratio, "longest over shortest edge";

@@ -196,12 +196,14 @@ keys! {
         /// [default: surface-diffusion]
         flow: Drawn<Flow> = Flow::SurfaceDiffusion.into(), "FLOW", EVOLUTION;
         /// Surface energy γ of a crystal (anisotropic) under surface diffusion, by the angle ψ of the outward normal:
-        /// cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1)
-        /// below 1. Any number may be a distribution. --energy 1 is isotropic, but in the geometric form [default: 1]
+        /// cos:FOLD,EPS[,DEG] is 1 + EPS cos FOLD(ψ - DEG); a sum of two is cos:...+cos:... . FOLD is 2 to 12, and
+        /// EPS (FOLD^2 - 1) below 1. Any number may be a distribution. --energy 1 is isotropic, but in the geometric
+        /// form [default: 1]
         energy?: Drawn<Energy>, "GAMMA", EVOLUTION;
-        /// Mobility of the atoms along the surface of a crystal: cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG), above 0 in
-        /// all directions; a sum of two as for --energy. Any number may be a distribution [default: 1]
-        diffusivity?: Drawn<Diffusivity>, "M", EVOLUTION;
+        /// Relative diffusivity along the surface of a crystal, by the same angle: cos:FOLD,EPS[,DEG] is
+        /// 1 + EPS cos FOLD(ψ - DEG), above 0 in all directions; a sum of two as for --energy. Any number may be a
+        /// distribution [default: 1]
+        diffusivity?: Drawn<Diffusivity>, "D", EVOLUTION;
         /// Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
         /// diffusion has R(t) = R(0) - F t. F, or feedback:C,A0 for C (A - A0), which brings the area A to A0. Any
         /// number may be a distribution [default: 0]
@@ -225,7 +227,7 @@ keys! {
         /// before SPEC.toml [default: off]
         adaptive?: f64, "TOL", EVOLUTION, or "0.001";
         /// Final time. auto: each member ends when it is relaxed, at the latest at six times the relaxation time that
-        /// linear theory predicts for its cell; a member that --drive shrinks to a point ends there. T1,T2,...: one for
+        /// linear theory predicts for its cell; a member that --drive shrinks to a point runs until it vanishes. T1,T2,...: one for
         /// each cell of a sweep [default: 2]
         t_end?: FinalTime, "T", EVOLUTION;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
@@ -267,8 +269,8 @@ keys! {
         /// Count a member as relaxed when its excess has fallen to this value, instead of --relax-to. Use it for rough
         /// outlines, whose initial excess is that of their details [default: off]
         relax_at?: f64, "EXCESS", EVOLUTION;
-        /// End a member as soon as it is relaxed; one that --drive shrinks to a point ends there. Vesicles (--conserve
-        /// area,length) run to the final time [default: false; with --t-end auto true]
+        /// End a member as soon as it is relaxed; one that --drive shrinks to a point runs until it vanishes, and
+        /// vesicles (--conserve area,length) run to the final time [default: false; with --t-end auto true]
         stop_when_relaxed?: bool, "BOOL", EVOLUTION, every cell;
         /// Run every member also with n/2, n/√2 and n nodes and a tenth of the step tolerance, and extrapolate t_relax
         /// to n → ∞: columns t_limit, t_error, order and points of summary.csv; with --drive t_vanish, too:

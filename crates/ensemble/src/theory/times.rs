@@ -141,7 +141,7 @@ fn far_omega(spec: &Spec, own: f64) -> Option<String> {
 fn far_tau(spec: &Spec, own: f64) -> Option<String> {
     let Pace::Fixed(OrAuto::Number(tau)) = spec.pace() else { return None };
     let what = match tau / own {
-        ratio if ratio > LONG_TAU => "is too long for the curve to be followed",
+        ratio if ratio > LONG_TAU => "is too large a step for this curve",
         ratio if ratio < SHORT_TAU => "needs far more steps than the curve does",
         _ => return None,
     };
@@ -387,7 +387,7 @@ mod tests {
                 "--omega 0.0001 is too slow to keep the nodes of the curve evenly spaced; use auto, which is 1 here",
             ),
             ("omega = 500", "--omega 500 moves nodes faster than the curve moves; use auto, which is 1 here"),
-            ("tau = 0.11", "--tau 0.11 is too long for the curve to be followed; use auto, which is 0.000998 here"),
+            ("tau = 0.11", "--tau 0.11 is too large a step for this curve; use auto, which is 0.000998 here"),
             ("tau = 9e-9\nt-end = 0.01", "--tau 9e-9 needs far more steps than the curve does"),
             (
                 "t-end = 1e-4\ntau = 1e-6",

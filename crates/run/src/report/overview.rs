@@ -413,9 +413,7 @@ results    out: summary.csv, run.json
             nodes(&tally)
         };
         let bound = |all: u64| {
-            Some(format!(
-                "is conservative for 1 of {all} members: their times at different n show no order of convergence"
-            ))
+            Some(format!("is a cautious bound for 1 of {all} members: their order of convergence is not steady yet"))
         };
         let more =
             |finer: u64, all: u64| Some(format!("{finer} of {all} members needed more nodes for t_limit, up to 283"));

@@ -19,6 +19,8 @@ pub(super) struct Remedies {
     vesicles: bool,
     stops: bool,
     short: bool,
+    /// A member is relaxed at a share of its initial excess.
+    pub(super) relative: bool,
 }
 
 impl Remedies {
@@ -32,6 +34,7 @@ impl Remedies {
             vesicles: spec.has_vesicles(),
             stops: spec.stops_when_relaxed(),
             short: spec.precision == Some(Precision::F32),
+            relative: spec.relax_at.is_none() && !spec.sweep.has("relax-at"),
         }
     }
 
@@ -43,7 +46,9 @@ impl Remedies {
             text += ", as where a strong force makes the sides of a thin curve meet";
         }
         text += match (geometric, adaptive, pulled) {
-            (false, ..) => ", a smaller --tau or --adaptive, or more --points, helps",
+            (false, false, _) => ", --adaptive --pull auto helps, or a smaller --tau",
+            (false, true, false) => ", --pull auto helps, or more --points or a smaller --adaptive",
+            (false, true, true) => ", more --points help, or a smaller --adaptive",
             (true, false, _) => ", --adaptive --pull auto helps, and more --points",
             (true, true, false) => ", --pull auto helps, and more --points",
             (true, true, true) => {

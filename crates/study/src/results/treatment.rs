@@ -173,7 +173,7 @@ impl FinerMembers {
         let FinerMembers { judged, bounds, .. } = *self;
         (bounds > 0).then(|| {
             format!(
-                "is conservative for {bounds} of {judged} {}: their times at different n show no order of convergence",
+                "is a cautious bound for {bounds} of {judged} {}: their order of convergence is not steady yet",
                 plural(judged, "member")
             )
         })

@@ -20,7 +20,7 @@ impl Tally {
             let swept = self.sweeps_k > 0 || self.sweeps_x > 0;
             let remedy = match stalled > 0 && swept {
                 true if stalled == failed && !self.remedies.adaptive => {
-                    "Gauss-Seidel sweeps did not converge; use --solver direct".into()
+                    "Gauss-Seidel sweeps did not converge; use --adaptive --pull auto, or --solver direct".into()
                 }
                 true => format!("use --solver direct where sweeps stalled; {}", self.remedies.of_failures()),
                 false => self.remedies.of_failures(),
@@ -53,10 +53,15 @@ impl Tally {
             ));
         }
         if let (coarse @ 1.., most) = self.coarse {
+            let remedy = match self.remedies.relative {
+                true => {
+                    "use --relax-at 0.01, as details decide when a share of the initial excess is left, or give more points"
+                }
+                false => "give more points, or --interpolate spline if the outlines are smooth between these",
+            };
             warnings.push(format!(
                 "the outlines of {coarse} of {members} have too few data points: without every second one, their times change \
-                 by up to {} % (see `t_data_error`); give more points, or --interpolate spline if the outlines are smooth \
-                 between these",
+                 by up to {} % (see `t_data_error`); {remedy}",
                 significant(100.0 * most, 2)
             ));
         }
@@ -91,8 +96,7 @@ impl Tally {
         let all = self.members();
         (before > 0).then(|| {
             format!(
-                "{before} of {all} {} vanished before they relaxed: for t_relax they are censored at that time, as if they \
-                 would relax later; see t_vanish",
+                "{before} of {all} {} vanished before relaxing: t_relax is censored at that time (see t_vanish)",
                 plural(all, "member")
             )
         })
@@ -127,10 +131,10 @@ impl Tally {
         let kinds = kinds.into_iter().map(|(did, without)| (did.to_string(), "levels.csv", without)).chain(named);
         let told = |(did, file, without): (String, &str, u64)| {
             let members = count(self.members(), "member");
-            let round = if did == "vanished" { ", or they were not round at the end" } else { "" };
+            let round = if did == "vanished" { ", or a curve was not round at the end" } else { "" };
             format!(
-                "{without} of {members} {did} and have no limit, as their times at other resolutions show none (see {file})\
-                 {round}: among the limits they count as later than their own time; more --points may help"
+                "{without} of {members} {did} without a limit: the times at other resolutions do not converge (see {file})\
+                 {round}; statistics of limits censor them at their own time; more --points may help"
             )
         };
         kinds.filter(|(.., without)| *without > 0).map(told).collect()
