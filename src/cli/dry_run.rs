@@ -36,9 +36,9 @@ fn table(estimate: &Estimate, spec: &Spec) -> String {
     let is_open = spec.refine && estimate.finer_members.is_none() && estimate.most_points > spec.points;
     let rows = [
         ("members", format!("the run has {} in {cells} {}", count(*members, "member"), plural(*cells as u64, "cell"))),
-        ("levels", levels(estimate, is_open)),
+        ("levels", levels(estimate, spec, is_open)),
         ("back end", format!("it runs on {}; solver {}", machine(&estimate.platform), spec.solver().name())),
-        ("resident", format!("memory holds up to {} at a time", count((*slots as u64).min(*members), "member"))),
+        ("resident", format!("up to {} may be in progress at a time", count((*slots as u64).min(*members), "member"))),
         ("memory", format!("it needs about {}", bytes(estimate.memory_bytes))),
         ("disk", format!("its files take about {}", bytes(estimate.disk_bytes))),
         (
@@ -71,12 +71,16 @@ fn started(Pilot { members, ended, failed, seconds, .. }: &Pilot) -> String {
         0 => String::new(),
         _ => format!("; {failed} failed: a run with --only 0 says why"),
     };
-    format!("{members} members were started for this estimate, and {ended} ended, in {}{failed}", duration(*seconds))
+    format!(
+        "{members} runs of a member were started for this estimate, and {ended} ended, in {}{failed}",
+        duration(*seconds)
+    )
 }
 
 /// The further runs of members, for the error of discretisation.
 fn levels(
     Estimate { level_members, finer_members, varied_members, most_points, .. }: &Estimate,
+    spec: &Spec,
     is_open: bool,
 ) -> String {
     let finer = match *finer_members {
@@ -98,8 +102,11 @@ fn levels(
     };
     match *level_members {
         0 => "no member runs at other resolutions: the error of discretisation will be unknown".into(),
-        1 => format!("discretisation is estimated from 1 further run at another resolution{finer}{varied}"),
-        runs => format!("discretisation is estimated from {runs} further runs at other resolutions{finer}{varied}"),
+        runs => {
+            let what = if spec.refine { "t_limit takes" } else { "the error of discretisation takes" };
+            let runs = count(runs, "further run");
+            format!("{what} {runs} of a member, at other resolutions{finer}{varied}")
+        }
     }
 }
 
@@ -138,14 +145,14 @@ mod tests {
         };
         let expected = "\
 members    the run has 3000 members in 1 cell
-levels     discretisation is estimated from 32 further runs at other resolutions
+levels     the error of discretisation takes 32 further runs of a member, at other resolutions
 back end   it runs on cpu, f64, 2 threads (asked for); solver gauss-seidel
-resident   memory holds up to 128 members at a time
+resident   up to 128 members may be in progress at a time
 memory     it needs about 17 MB
 disk       its files take about 1.2 GB
 steps      each member takes about 2000 on average
 time       the run takes about 31.9 s
-pilot      130 members were started for this estimate, and 130 ended, in 1.40 s
+pilot      130 runs of a member were started for this estimate, and 130 ended, in 1.40 s
 ";
         assert_eq!(table(&estimate, &Spec::default()), expected);
         let on_gpu = Platform { backend: DeviceKind::Gpu, ..estimate.platform.clone() };
@@ -153,7 +160,7 @@ pilot      130 members were started for this estimate, and 130 ended, in 1.40 s
         let dispatched = "dispatches there are about 740\nstart-up   it takes 0.01 s\ntime       the run takes about 31.9 s after start-up\n";
         assert!(on_gpu.contains(dispatched), "{on_gpu}");
         let finer = Estimate { finer_members: Some(12), most_points: 1600, ..estimate.clone() };
-        let told = "levels     discretisation is estimated from 32 further runs at other resolutions; about 12 members need more nodes, up to n = 1600\n";
+        let told = "levels     the error of discretisation takes 32 further runs of a member, at other resolutions; about 12 members need more nodes, up to n = 1600\n";
         assert!(table(&finer, &Spec::default()).contains(told));
         let varied = Estimate { varied_members: 8, ..finer };
         assert!(
