@@ -142,7 +142,5 @@ impl PanelGrid {
     }
 }
 
-#[doc(hidden)]
-pub mod samples;
 #[cfg(test)]
 mod tests;
