@@ -101,7 +101,7 @@ fn t_relax_by<T: Evolves>(nodes: &[DVec2], flow: &Flow, geometric: bool, adaptiv
 /// The same with any parameters and by any solver.
 fn t_relax_with<T: Evolves>(nodes: &[DVec2], mut p: Parameters<f64>, method: &Method) -> f64 {
     let n = nodes.len();
-    p.set_levels(&level(-1e18), &level(1e18));
+    (p.low, p.high) = (level(-1e18), level(1e18));
     let start = Run::new(State::<f64>::from_nodes(nodes), p).report.now.excess;
     (p.relax_at, p.half_at, p.follow_to) = (0.01 * start, 0.5 * start, 0.01 * start);
     let mut run: Run<T> = started(nodes, p);
@@ -208,7 +208,7 @@ fn a_circle_at_rest_stays_one() {
         let mut p = parameters(n, &Flow::SurfaceDiffusion, 1e-3);
         (p.end_high, p.goal_high, p.clock_end, p.relax_at) = (8.0, 8.0, 8.0, -1.0);
         (p.half_at, p.follow_to) = (-1.0, 1e-6);
-        p.set_levels(&level(-1e18), &level(1e18));
+        (p.low, p.high) = (level(-1e18), level(1e18));
         let mut run: Run<f32> = started(&ellipse(n, 1.2), p);
         let before = run.report.now;
         run.report.progress.next = 1e-5;

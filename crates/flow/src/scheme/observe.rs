@@ -285,12 +285,12 @@ pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>) -> Observed<
 /// Whether an observable has reached a level at which the member pauses.
 #[inline(always)]
 pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask {
-    let fell = at.length.le(p.low_length).or(at.area.le(p.low_area)).or(at.excess.le(p.low_excess));
-    let fell = fell.or(at.energy.le(p.low_energy)).or(at.k_min.le(p.low_k_min)).or(at.k_max.le(p.low_k_max));
-    let fell = fell.or(at.mesh_ratio.le(p.low_mesh_ratio)).or(at.metric_drift.le(p.low_metric_drift));
-    let rose = p.high_length.le(at.length).or(p.high_area.le(at.area)).or(p.high_excess.le(at.excess));
-    let rose = rose.or(p.high_energy.le(at.energy)).or(p.high_k_min.le(at.k_min)).or(p.high_k_max.le(at.k_max));
-    fell.or(rose).or(p.high_mesh_ratio.le(at.mesh_ratio)).or(p.high_metric_drift.le(at.metric_drift))
+    let fell = at.length.le(p.low.length).or(at.area.le(p.low.area)).or(at.excess.le(p.low.excess));
+    let fell = fell.or(at.energy.le(p.low.energy)).or(at.k_min.le(p.low.k_min)).or(at.k_max.le(p.low.k_max));
+    let fell = fell.or(at.mesh_ratio.le(p.low.mesh_ratio)).or(at.metric_drift.le(p.low.metric_drift));
+    let rose = p.high.length.le(at.length).or(p.high.area.le(at.area)).or(p.high.excess.le(at.excess));
+    let rose = rose.or(p.high.energy.le(at.energy)).or(p.high.k_min.le(at.k_min)).or(p.high.k_max.le(at.k_max));
+    fell.or(rose).or(p.high.mesh_ratio.le(at.mesh_ratio)).or(p.high.metric_drift.le(at.metric_drift))
 }
 
 /// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the
@@ -310,18 +310,18 @@ pub fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N
 /// the two [`LOOKS`] and at the end. Where the host looks closely, it may turn out that none has.
 #[inline(always)]
 pub fn passes_level<N: Number>(at: &[Observed<N>; 4], p: &Parameters<N>) -> N::Mask {
-    let passes = |of: fn(&Observed<N>) -> N, low: N, high: N| {
+    let passes = |of: fn(&Observed<N>) -> N| {
         let values = at.each_ref().map(of);
-        falls_inside(values, low).or(falls_inside(values.map(|value| -value), -high))
+        falls_inside(values, of(&p.low)).or(falls_inside(values.map(|value| -value), -of(&p.high)))
     };
-    let length = passes(|at| at.length, p.low_length, p.high_length);
-    let area = passes(|at| at.area, p.low_area, p.high_area);
-    let excess = passes(|at| at.excess, p.low_excess, p.high_excess);
-    let energy = passes(|at| at.energy, p.low_energy, p.high_energy);
-    let k_min = passes(|at| at.k_min, p.low_k_min, p.high_k_min);
-    let k_max = passes(|at| at.k_max, p.low_k_max, p.high_k_max);
-    let mesh_ratio = passes(|at| at.mesh_ratio, p.low_mesh_ratio, p.high_mesh_ratio);
-    let metric_drift = passes(|at| at.metric_drift, p.low_metric_drift, p.high_metric_drift);
+    let length = passes(|at| at.length);
+    let area = passes(|at| at.area);
+    let excess = passes(|at| at.excess);
+    let energy = passes(|at| at.energy);
+    let k_min = passes(|at| at.k_min);
+    let k_max = passes(|at| at.k_max);
+    let mesh_ratio = passes(|at| at.mesh_ratio);
+    let metric_drift = passes(|at| at.metric_drift);
     length.or(area).or(excess).or(energy).or(k_min).or(k_max).or(mesh_ratio).or(metric_drift)
 }
 
@@ -346,7 +346,7 @@ mod tests {
                 } else {
                     high[field] = level
                 }
-                p.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
+                (p.low, p.high) = (Observed::from_numbers(&low), Observed::from_numbers(&high));
                 passes_level(&seen(value), &p)
             };
             for turn in [0.07, 0.2, 0.5, 0.9] {
