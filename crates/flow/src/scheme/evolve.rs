@@ -131,13 +131,12 @@ impl<N: Number> Team<N> {
     }
 
     fn with(work: Workspace<N>) -> Team<N> {
-        let stride = Stride { length: N::Real::of(0.0), high: N::Real::of(0.0), low: N::Real::of(0.0), last: false };
         Team {
             state: State::zeros(work.blocks.n),
             parameters: Parameters::default(),
             excess: N::default(),
             turning: N::default(),
-            strides: vec![stride; N::LANES],
+            strides: vec![Stride::default(); N::LANES],
             shares: AllShares::computed(),
             work,
         }
@@ -161,7 +160,7 @@ impl<N: Number> Team<N> {
     /// Copies a member back from its lane, with its report.
     #[inline(always)]
     fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
-        let fields = self.state.fields().into_iter().zip(run.state.fields_mut()).take(LASTING_FIELDS);
+        let fields = self.state.fields().zip(run.state.fields_mut()).take(LASTING_FIELDS);
         for (field, (from, to)) in fields.enumerate() {
             // An adaptive step begins without increments; those of its last row depend on the orders of other lanes.
             if adaptive && (CURVE_FIELDS..CURVE_FIELDS + INCREMENT_FIELDS).contains(&field) {
@@ -309,8 +308,9 @@ impl<N: Number> Team<N> {
             count_sweeps(&mut run.counters, &attempt.stepped, lane);
             let (stride, errors) = (self.strides[lane], attempt.errors.map(|error| error.lane(lane)));
             run.counters.solves += if adaptive { extrapolation::parts::<N::Real>(run.counters.order) } else { 1 };
-            let of_solves = failure_of_solves(&attempt.stepped, lane);
-            let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
+            let Stepped { solved, finite: solves_finite, .. } = attempt.stepped;
+            let of_solves = failure(solves_finite.lane(lane), solved.lane(lane), Status::Stalled);
+            let failure = of_solves.or(failure(finite.lane(lane), !singular.lane(lane), Status::Singular));
             let length = run.report.now.length;
             let allowed = adaptive.then(|| Allowed {
                 error: pace::allowed(
@@ -459,22 +459,12 @@ fn count_sweeps<N: Number>(counters: &mut Counters, stepped: &Stepped<N>, lane: 
     counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
 }
 
-/// The failure of the solves of a step, if any.
-#[inline(always)]
-fn failure_of_solves<N: Number>(stepped: &Stepped<N>, lane: usize) -> Option<Status> {
-    match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
+/// The failure of solves, or of the curve after them, if any: of what is finite but not `sound` it is `unsound`.
+fn failure(finite: bool, sound: bool, unsound: Status) -> Option<Status> {
+    match (finite, sound) {
         (false, _) => Some(Status::Nonfinite),
-        (true, false) => Some(Status::Stalled),
+        (true, false) => Some(unsound),
         (true, true) => None,
-    }
-}
-
-/// The failure of a curve after a solved step, if any.
-fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
-    match (finite, singular) {
-        (false, _) => Some(Status::Nonfinite),
-        (true, true) => Some(Status::Singular),
-        (true, false) => None,
     }
 }
 

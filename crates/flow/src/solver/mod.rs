@@ -113,9 +113,6 @@ pub trait Solves: 'static {
     /// What the rest of the program knows about it.
     const FACTS: Facts;
 
-    /// Allocates its memory, apart from the unknowns, for systems of `n` equations.
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F>;
-
     /// Solves `system` for `unknown`, one ring per right-hand side, in the lanes that are `live`; sweeps start from the
     /// values of `unknown`. Other lanes cost no sweeps and mean nothing afterwards.
     fn solve<N: Number, const F: usize>(
@@ -182,14 +179,14 @@ pub struct Memory<N, const F: usize> {
 }
 
 impl<N: Number, const F: usize> Memory<N, F> {
-    /// Allocates nothing.
-    pub fn none() -> Self {
-        Self::with([0; 2])
-    }
-
     /// Allocates what any solver needs for systems of `n` equations.
     pub fn any(n: usize) -> Self {
         Self::with([n; 2])
+    }
+
+    /// Allocates what the solver `S` needs for them.
+    pub fn of_solver<S: Solves>(n: usize) -> Self {
+        Self::with(if S::FACTS.sweeps { [n, 0] } else { [0, n] })
     }
 
     fn with([system, factor]: [usize; 2]) -> Self {
@@ -211,10 +208,6 @@ impl Solves for Sweeps {
         numbers_to_refine: 0,
         kernel: KernelFacts { shuffles: true, rows_per_block: 3 },
     };
-
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
-        Memory { system: System::zeros(n), ..Memory::none() }
-    }
 
     #[inline(always)]
     fn solve<N: Number, const F: usize>(
@@ -259,10 +252,6 @@ impl Solves for Elimination {
         numbers_to_refine: 9,
         kernel: KernelFacts { shuffles: false, rows_per_block: 6 },
     };
-
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
-        Memory { factor: direct::Factor::new(n), ..Memory::none() }
-    }
 
     #[inline(always)]
     fn solve<N: Number, const F: usize>(
