@@ -182,7 +182,7 @@ fn cases<T: Evolves>(index: usize, gpu: &Gpu, solver: Solver) -> Vec<Trial> {
     add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 7);
     add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
     add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 101);
-    for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().kernel.shuffles) {
+    for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().shuffles) {
         add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
     }
     add("members that end badly leave the others untouched".into(), bad_members::<T>, 101);

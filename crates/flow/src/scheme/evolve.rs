@@ -199,8 +199,6 @@ impl<N: Number> Team<N> {
             let (gaps, blocks) = (&state.gaps, work.blocks);
             errors =
                 extrapolation::errors_of_attempt(gaps, &work.new, seen.length, followed, parameters, branches, blocks);
-        }
-        if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
             decline = observe::decline(&work.new, slope, bend, &seen, parameters, branches.law, work.blocks);
         }

@@ -186,7 +186,7 @@ pub fn add_part<N: Number>(
     let errors = gaps.own.fields_mut().into_iter().zip(gaps.lower.fields_mut());
     let all = changes.zip(sums).zip(errors).enumerate();
     for (field, (((new, old), ((value, slope), bend)), (gap, lower_gap))) in all {
-        let errs = left == 0 && (branches.geometric || !is_of_places(field));
+        let counts_as_error = left == 0 && (branches.geometric || !is_of_places(field));
         for i in 0..new.len() {
             let change = N::select(busy, change_from(field, old[i], new[i]), N::of(0.0));
             bend[i] += shares.bend * change;
@@ -196,7 +196,7 @@ pub fn add_part<N: Number>(
             if left == 0 {
                 value[i] += shares.value * change;
             }
-            if errs {
+            if counts_as_error {
                 gap[i] += shares.gap * change;
                 lower_gap[i] += shares.lower_gap * change;
             }

@@ -54,15 +54,7 @@ impl Solver {
     pub const ALL: [Solver; 2] = [Solver::GaussSeidel, Solver::Direct];
 
     /// Their names, in the same order.
-    pub const NAMES: [&str; Solver::ALL.len()] = {
-        let mut names = [""; Solver::ALL.len()];
-        let mut i = 0;
-        while i < names.len() {
-            names[i] = Solver::ALL[i].name();
-            i += 1;
-        }
-        names
-    };
+    pub const NAMES: [&str; Solver::ALL.len()] = [Solver::ALL[0].name(), Solver::ALL[1].name()];
 
     /// Returns what the rest of the program knows about it.
     pub const fn facts(self) -> &'static Facts {
@@ -156,16 +148,9 @@ pub struct Facts {
     pub numbers_per_node: usize,
     /// How many more it stores in short numbers, whose solutions are refined.
     pub numbers_to_refine: usize,
-    /// What the kernel needs to know about it.
-    pub kernel: KernelFacts,
-}
-
-/// What the kernel needs to know about a solver.
-#[derive(Debug)]
-pub struct KernelFacts {
-    /// Whether a member that is one subgroup may exchange by shuffles.
+    /// Whether a member that is one subgroup of the kernel may exchange by shuffles.
     pub shuffles: bool,
-    /// Rows of four numbers per block in workgroup memory, where threads exchange by barriers.
+    /// Rows of four numbers per block in the kernel's workgroup memory, where threads exchange by barriers.
     pub rows_per_block: usize,
 }
 
@@ -206,7 +191,8 @@ impl Solves for Sweeps {
         refuses_because: "",
         numbers_per_node: 13,
         numbers_to_refine: 0,
-        kernel: KernelFacts { shuffles: true, rows_per_block: 3 },
+        shuffles: true,
+        rows_per_block: 3,
     };
 
     #[inline(always)]
@@ -250,7 +236,8 @@ impl Solves for Elimination {
         refuses_because: "the direct solver makes no sweeps",
         numbers_per_node: 11,
         numbers_to_refine: 9,
-        kernel: KernelFacts { shuffles: false, rows_per_block: 6 },
+        shuffles: false,
+        rows_per_block: 6,
     };
 
     #[inline(always)]
