@@ -46,18 +46,13 @@ struct Attempt<N: Number> {
     seen: Glance<N>,
 }
 
-/// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
-///
-/// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive step is
-/// retried with a shorter length until that is too short to mean anything. A step that is too inaccurate at every
-/// length follows a curve that n nodes do not resolve; this counts as singular.
-pub fn evolve<T: Evolves>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
-    T::evolve(run, method, team, attempts);
-}
-
-/// A number for which [`evolve`] is compiled, here and not again in every crate that runs members.
+/// A number for which members are advanced, compiled here and not again in every crate that runs members.
 pub trait Evolves: Steps {
-    #[doc(hidden)]
+    /// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
+    ///
+    /// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive step
+    /// is retried with a shorter length until that is too short to mean anything. A step that is too inaccurate at
+    /// every length follows a curve that n nodes do not resolve; this counts as singular.
     fn evolve(run: &mut Run<Self>, method: &Method, team: &mut Team<Self>, attempts: u32);
 }
 
@@ -392,7 +387,7 @@ impl<N: Number> Team<N> {
                 _ => &state.part,
             };
             let sums = observe::sums(curve, parameters, branches.law, work.blocks);
-            seen[look] = observe::observed(&sums, &observe::maxima(curve, parameters));
+            seen[look] = observe::observed(&sums, curve, parameters);
         }
         let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };
         [observe::reaches_level(&seen[last], parameters), passed]

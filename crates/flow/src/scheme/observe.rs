@@ -50,21 +50,6 @@ pub struct CurveSums<N> {
     pub excess: N,
 }
 
-/// The maxima; a value that is not finite shows as more than [`BIG`].
-#[derive(Clone, Copy, Debug)]
-pub struct Maxima<N> {
-    /// `max |r_i - |e_i|| / |e_i|`.
-    pub drift: N,
-    /// Longest edge.
-    pub longest: N,
-    /// Minus the shortest edge.
-    pub minus_shortest: N,
-    /// Largest curvature.
-    pub k_max: N,
-    /// Minus the smallest curvature.
-    pub minus_k_min: N,
-}
-
 /// What every step is judged by: the decisive part of the sums and maxima, without a division.
 #[derive(Clone, Copy, Debug)]
 pub struct Glance<N> {
@@ -164,22 +149,6 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
     CurveSums { length, area, energy, turning, tension, excess }
 }
 
-/// Computes the maxima over the ring.
-#[inline(always)]
-pub fn maxima<N: Number>(curve: &Curve<N>, p: &Parameters<N>) -> Maxima<N> {
-    let low = N::of(-2.0 * BIG);
-    let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
-    for i in 0..curve.x.len() {
-        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve.nodes(), i)[2]);
-        m.drift = m.drift.max(((r - e) / e).bounded_abs());
-        m.longest = m.longest.max(e.bounded_abs());
-        m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
-        m.k_max = m.k_max.max(k);
-        m.minus_k_min = m.minus_k_min.max(-k);
-    }
-    m
-}
-
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
 ///
 /// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A. Of a crystal, `γ|e|` stands for the length of an
@@ -264,21 +233,31 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
 /// Observes a curve.
 #[inline(never)]
 pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve, p))
+    observed(&sums(curve, p, p.kind_of_law(), blocks), curve, p)
 }
 
-/// Derives the observables from the sums and maxima of a curve.
+/// The observables of a curve with these sums. A value that is not finite shows as more than [`BIG`].
 #[inline(always)]
-pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>) -> Observed<N> {
+pub fn observed<N: Number>(sums: &CurveSums<N>, curve: &Curve<N>, p: &Parameters<N>) -> Observed<N> {
+    let low = N::of(-2.0 * BIG);
+    let (mut drift, mut longest, mut minus_shortest, mut k_max, mut minus_k_min) = (low, low, low, low, low);
+    for i in 0..curve.x.len() {
+        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve.nodes(), i)[2]);
+        drift = drift.max(((r - e) / e).bounded_abs());
+        longest = longest.max(e.bounded_abs());
+        minus_shortest = minus_shortest.max(-e.bounded_abs());
+        k_max = k_max.max(k);
+        minus_k_min = minus_k_min.max(-k);
+    }
     Observed {
         length: sums.length,
         area: sums.area,
         excess: sums.excess,
         energy: sums.energy,
-        k_min: -maxima.minus_k_min,
-        k_max: maxima.k_max,
-        mesh_ratio: maxima.longest / -maxima.minus_shortest,
-        metric_drift: maxima.drift,
+        k_min: -minus_k_min,
+        k_max,
+        mesh_ratio: longest / -minus_shortest,
+        metric_drift: drift,
     }
 }
 
