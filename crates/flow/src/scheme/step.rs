@@ -79,8 +79,8 @@ macro_rules! steps {
 
 steps!(f64 f32);
 
-/// Like [`Steps::step`], for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no
-/// sweeps and mean nothing afterwards.
+/// Like [`Steps::step`], for members side by side that share `branches`, by the solver `S`. Lanes that are not `live`
+/// cost no sweeps and mean nothing afterwards.
 #[inline(always)]
 pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,
