@@ -11,7 +11,7 @@ use curvelax::{
         observe,
         position::Position,
         redistribution,
-        step::{self, Method},
+        step::{Method, Steps},
     },
     solver::{Blocks, Memory, Order, Solver, direct, gauss_seidel, sweeps::Control},
     trajectory::Trajectory,
@@ -34,12 +34,12 @@ impl<T: Evolves> Start<T> {
         let (parameters, mut work) = (run.parameters, Workspace::new(Blocks::new(points).expect("n is at least 6")));
         let method = Method::coloured(Solver::Direct, 1);
         for _ in 0..10 {
-            step::step(&curve, &mut increments, &parameters, &method, &mut work);
+            Steps::step(&curve, &mut increments, &parameters, &method, &mut work);
             std::mem::swap(&mut curve, &mut work.new);
         }
         // Leaves both systems of the eleventh step in the workspace.
         work.traced = true;
-        step::step(&curve, &mut increments, &parameters, &method, &mut work);
+        Steps::step(&curve, &mut increments, &parameters, &method, &mut work);
         Start { curve, increments, parameters, work }
     }
 }

@@ -7,7 +7,7 @@ use curvelax::{
     flow::Flow,
     scheme::{
         Parameters, State, Workspace,
-        step::{self, Method},
+        step::{Method, Steps},
     },
     solver::{Blocks, Solver},
 };
@@ -20,7 +20,7 @@ fn ellipse<T: Evolves>(n: usize) -> (State<T>, Parameters<T>, Workspace<T>) {
     let parameters = Parameters::of_flow(&Flow::SurfaceDiffusion, 1e-3).convert();
     let mut work = Workspace::new(Blocks::new(n).expect("n is at least 6"));
     for _ in 0..10 {
-        step::step(&state.curve, &mut state.increments, &parameters, &method(Solver::Direct), &mut work);
+        Steps::step(&state.curve, &mut state.increments, &parameters, &method(Solver::Direct), &mut work);
         std::mem::swap(&mut state.curve, &mut work.new);
     }
     (state, parameters, work)
@@ -37,7 +37,7 @@ fn step_in<T: Evolves>(c: &mut Criterion) {
             c.bench_function(&format!("step/{}/n={n}/{name}", T::NAME), |b| {
                 b.iter(|| {
                     let mut increments = increments.clone();
-                    step::step(&curve, &mut increments, &parameters, &method(solver), &mut work)
+                    Steps::step(&curve, &mut increments, &parameters, &method(solver), &mut work)
                 });
             });
         }

@@ -1,8 +1,10 @@
 // The structs shared with the host, one entry per resident member. Twin of crates/flow/src/scheme/member.rs.
 
-/// Parameters of a member: the law, the step, sweeps, thresholds, adaptive steps and their times, levels
-/// at which it pauses.
+/// Parameters of a member: levels at which it pauses, the law, the step, sweeps, thresholds, adaptive steps and their
+/// times.
 struct Parameters {
+    low: Observed,
+    high: Observed,
     law: array<real, 32>,
     tau: real,
     omega: real,
@@ -30,22 +32,6 @@ struct Parameters {
     fit_to: real,
     growth: real,
     watched: real,
-    low_length: real,
-    low_area: real,
-    low_excess: real,
-    low_energy: real,
-    low_k_min: real,
-    low_k_max: real,
-    low_mesh_ratio: real,
-    low_metric_drift: real,
-    high_length: real,
-    high_area: real,
-    high_excess: real,
-    high_energy: real,
-    high_k_min: real,
-    high_k_max: real,
-    high_mesh_ratio: real,
-    high_metric_drift: real,
 }
 
 /// Observables of one curve.

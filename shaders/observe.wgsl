@@ -176,12 +176,12 @@ fn observed() -> Observed {
 /// Whether an observable has reached a level at which the member pauses.
 fn reaches_level(at: Observed) -> bool {
     let p = &all_parameters[member];
-    let fell = at.length <= p.low_length || at.area <= p.low_area || at.excess <= p.low_excess
-        || at.energy <= p.low_energy || at.k_min <= p.low_k_min || at.k_max <= p.low_k_max
-        || at.mesh_ratio <= p.low_mesh_ratio || at.metric_drift <= p.low_metric_drift;
-    let rose = p.high_length <= at.length || p.high_area <= at.area || p.high_excess <= at.excess
-        || p.high_energy <= at.energy || p.high_k_min <= at.k_min || p.high_k_max <= at.k_max
-        || p.high_mesh_ratio <= at.mesh_ratio || p.high_metric_drift <= at.metric_drift;
+    let fell = at.length <= p.low.length || at.area <= p.low.area || at.excess <= p.low.excess
+        || at.energy <= p.low.energy || at.k_min <= p.low.k_min || at.k_max <= p.low.k_max
+        || at.mesh_ratio <= p.low.mesh_ratio || at.metric_drift <= p.low.metric_drift;
+    let rose = p.high.length <= at.length || p.high.area <= at.area || p.high.excess <= at.excess
+        || p.high.energy <= at.energy || p.high.k_min <= at.k_min || p.high.k_max <= at.k_max
+        || p.high.mesh_ratio <= at.mesh_ratio || p.high.metric_drift <= at.metric_drift;
     return fell || rose;
 }
 
@@ -212,15 +212,15 @@ fn passes_level(a: Observed, looks: Looks, d: Observed) -> bool {
     let p = &all_parameters[member];
     let b = looks.early;
     let c = looks.late;
-    return passes(a.length, b.length, c.length, d.length, p.low_length, p.high_length)
-        || passes(a.area, b.area, c.area, d.area, p.low_area, p.high_area)
-        || passes(a.excess, b.excess, c.excess, d.excess, p.low_excess, p.high_excess)
-        || passes(a.energy, b.energy, c.energy, d.energy, p.low_energy, p.high_energy)
-        || passes(a.k_min, b.k_min, c.k_min, d.k_min, p.low_k_min, p.high_k_min)
-        || passes(a.k_max, b.k_max, c.k_max, d.k_max, p.low_k_max, p.high_k_max)
-        || passes(a.mesh_ratio, b.mesh_ratio, c.mesh_ratio, d.mesh_ratio, p.low_mesh_ratio, p.high_mesh_ratio)
+    return passes(a.length, b.length, c.length, d.length, p.low.length, p.high.length)
+        || passes(a.area, b.area, c.area, d.area, p.low.area, p.high.area)
+        || passes(a.excess, b.excess, c.excess, d.excess, p.low.excess, p.high.excess)
+        || passes(a.energy, b.energy, c.energy, d.energy, p.low.energy, p.high.energy)
+        || passes(a.k_min, b.k_min, c.k_min, d.k_min, p.low.k_min, p.high.k_min)
+        || passes(a.k_max, b.k_max, c.k_max, d.k_max, p.low.k_max, p.high.k_max)
+        || passes(a.mesh_ratio, b.mesh_ratio, c.mesh_ratio, d.mesh_ratio, p.low.mesh_ratio, p.high.mesh_ratio)
         || passes(
-            a.metric_drift, b.metric_drift, c.metric_drift, d.metric_drift, p.low_metric_drift, p.high_metric_drift,
+            a.metric_drift, b.metric_drift, c.metric_drift, d.metric_drift, p.low.metric_drift, p.high.metric_drift,
         );
 }
 

@@ -13,7 +13,7 @@ use curvelax::{
     },
     flow::Flow,
     relax,
-    scheme::{Parameters, State, Workspace, curvature::Curvature, position::Position, redistribution, step},
+    scheme::{Parameters, State, Workspace, curvature::Curvature, position::Position, redistribution, step::Steps},
     solver::{Blocks, Memory, direct},
     truth::{Beside, ConvergenceRow, LEMNISCATE_LIFE, Measure, Problem, Solved, Varied, problems, studies},
 };
@@ -241,7 +241,7 @@ struct Linear {
 }
 
 fn correct_step(Linear { state, work, p }: &mut Linear) {
-    step::step(&state.curve, &mut state.increments, p, &DIRECT, work);
+    Steps::step(&state.curve, &mut state.increments, p, &DIRECT, work);
     std::mem::swap(&mut state.curve, &mut work.new);
 }
 

@@ -15,7 +15,7 @@ use curvelax::{
         Parameters, State, Workspace,
         extrapolation::MOST_ORDER,
         observe::{self, CurveSums},
-        step::{self, Method},
+        step::{Method, Steps},
     },
     solver::{Blocks, Order, Solver},
 };
@@ -61,7 +61,7 @@ impl<T: Evolves> Stepper<T> {
     /// Makes one step, which must succeed.
     #[track_caller]
     pub fn step(&mut self) {
-        let stepped = step::step(&self.state.curve, &mut self.state.increments, &self.p, &self.method, &mut self.work);
+        let stepped = Steps::step(&self.state.curve, &mut self.state.increments, &self.p, &self.method, &mut self.work);
         assert!(stepped.solved && stepped.finite, "a system was not solved");
         std::mem::swap(&mut self.state.curve, &mut self.work.new);
     }

@@ -15,12 +15,7 @@ use curvelax::{
     equilibrium::Equilibrium,
     flow::Flow,
     placement::{self, MAX_POINTS_F32},
-    scheme::{
-        Parameters, State,
-        evolve::{Team, evolve},
-        run::Run,
-        step::Method,
-    },
+    scheme::{Parameters, State, evolve::Team, run::Run, step::Method},
     simulate::simulate,
     solver::{Blocks, Order},
 };
@@ -379,7 +374,7 @@ fn relaxed_ellipse<T: Evolves>(n: usize, method: &Method, tolerance: f64) -> (Ve
     let mut run: Run<T> = Run::<f64>::new(State::from_nodes(&nodes), parameters).convert();
     run.counters.goal = 1000;
     let mut work = Team::new(Blocks::new(n).unwrap());
-    evolve(&mut run, method, &mut work, 1000);
+    Evolves::evolve(&mut run, method, &mut work, 1000);
     assert_eq!((run.counters.status, run.counters.steps), (0, 1000), "n = {n}");
     let t_relax = (f64::from(run.counters.relax_step) + run.report.progress.relax_fraction.to_f64()) * 1e-3;
     (run.state.curve.positions().collect(), t_relax)

@@ -4,7 +4,7 @@ use curvelax::{
     flow::Flow,
     scheme::{
         Parameters, State, Workspace,
-        step::{self, Method},
+        step::{Method, Steps},
     },
     solver::{Blocks, Solver},
 };
@@ -39,7 +39,7 @@ fn worst_deviation(name: &str, flow: Flow, tau: f64, redistribution: bool) -> f6
     let (mut steps, mut worst) = (0, 0.0_f64);
     for (t, rows) in &states {
         while steps < (t / tau).round() as u64 {
-            step::step(&state.curve, &mut state.increments, &p, &method, &mut work);
+            Steps::step(&state.curve, &mut state.increments, &p, &method, &mut work);
             std::mem::swap(&mut state.curve, &mut work.new);
             steps += 1;
         }

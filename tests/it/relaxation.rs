@@ -77,7 +77,7 @@ fn follow<T: Evolves>(spec: &Spec, member: Member) -> (Ended, State<f64>) {
     let mut work = evolve::Team::new(Blocks::new(n).unwrap());
     let method = Method::coloured(spec.solver(), spec.max_sweeps);
     while !trajectory.is_over() {
-        evolve::evolve(&mut run, &method, &mut work, 64);
+        Evolves::evolve(&mut run, &method, &mut work, 64);
         trajectory.observe(run.counters, &run.report.convert());
         let state = trajectory.wants_state().then(|| run.state.convert());
         trajectory.serve(state.as_ref(), usize::MAX);
@@ -530,7 +530,7 @@ fn extrapolate(run: &mut Run<f64>, t: f64, steps: u32, order: u32) {
     for _ in 0..steps {
         run.report.progress.next = t / f64::from(steps);
         run.counters.order = order;
-        evolve::evolve(run, &DIRECT, &mut work, 1);
+        Evolves::evolve(run, &DIRECT, &mut work, 1);
     }
     assert_eq!((run.counters.steps - before, run.counters.rejected), (steps, 0));
 }
@@ -593,7 +593,7 @@ fn a_round_polygon_under_a_foreign_curvature_does_not_count_as_relaxed() {
         let mut run = Run::new(state, Parameters { polygon_ratio: 1.0, relax_at: 0.1, ..p });
         run.counters.goal = 1;
         let method = Method::coloured(Solver::Direct, 1);
-        evolve::evolve(&mut run, &method, &mut evolve::Team::new(Blocks::new(50).unwrap()), 1);
+        Evolves::evolve(&mut run, &method, &mut evolve::Team::new(Blocks::new(50).unwrap()), 1);
         assert_eq!((run.counters.status, run.counters.steps), (0, 1));
         assert_eq!(run.counters.relax_step == 0, relaxes, "curvature {foreign} times the polygon's");
     }

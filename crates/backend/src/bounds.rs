@@ -40,7 +40,7 @@ pub enum NaturalScale {
     Mesh,
 }
 
-/// A quantity of one step: its name, its scale, and the factors k for software and hardware adapters.
+/// A quantity of one step: its name, its scale, and the factor k.
 #[derive(Clone, Copy, Debug)]
 pub struct Bound {
     /// The quantity.
@@ -48,59 +48,60 @@ pub struct Bound {
     /// What its rounding errors are measured in.
     pub scale: NaturalScale,
     /// k on a software adapter, which rounds as Rust does.
-    pub software: f64,
-    /// k on hardware, which may fuse `a*b + c`.
-    pub hardware: f64,
+    software: f64,
 }
 
-const fn bound(quantity: &'static str, scale: NaturalScale, software: f64, hardware: f64) -> Bound {
-    Bound { quantity, scale, software, hardware }
+/// k on hardware, which may fuse `a*b + c`, over that on a software adapter.
+const ON_HARDWARE: f64 = 4.0;
+
+const fn bound(quantity: &'static str, scale: NaturalScale, software: f64) -> Bound {
+    Bound { quantity, scale, software }
 }
 
 /// The stages of a step, in the order of the kernel's trace.
 pub const STAGES: [Bound; TRACE_FIELDS] = [
-    bound("β", NaturalScale::Velocity, 4.0, 16.0),
-    bound("α", NaturalScale::Tangential, 4.0, 16.0),
-    bound("r", NaturalScale::Length, 4.0, 16.0),
-    bound("a", NaturalScale::One, 8.0, 32.0),
-    bound("b", NaturalScale::One, 8.0, 32.0),
-    bound("d", NaturalScale::One, 8.0, 32.0),
-    bound("e", NaturalScale::One, 8.0, 32.0),
-    bound("weight of k", NaturalScale::Weight, 8.0, 32.0),
-    bound("right-hand side of k", NaturalScale::Curvature, 8.0, 32.0),
-    bound("δk", NaturalScale::SolvedCurvature, 16.0, 64.0),
-    bound("𝓐", NaturalScale::One, 8.0, 32.0),
-    bound("𝓑", NaturalScale::One, 8.0, 32.0),
-    bound("𝓓", NaturalScale::One, 8.0, 32.0),
-    bound("𝓔", NaturalScale::One, 8.0, 32.0),
-    bound("weight of x", NaturalScale::Weight, 8.0, 32.0),
-    bound("right-hand side of x", NaturalScale::Length, 8.0, 32.0),
-    bound("right-hand side of y", NaturalScale::Length, 8.0, 32.0),
-    bound("δx", NaturalScale::SolvedPosition, 16.0, 64.0),
-    bound("δy", NaturalScale::SolvedPosition, 16.0, 64.0),
-    bound("k", NaturalScale::SolvedCurvature, 16.0, 64.0),
+    bound("β", NaturalScale::Velocity, 4.0),
+    bound("α", NaturalScale::Tangential, 4.0),
+    bound("r", NaturalScale::Length, 4.0),
+    bound("a", NaturalScale::One, 8.0),
+    bound("b", NaturalScale::One, 8.0),
+    bound("d", NaturalScale::One, 8.0),
+    bound("e", NaturalScale::One, 8.0),
+    bound("weight of k", NaturalScale::Weight, 8.0),
+    bound("right-hand side of k", NaturalScale::Curvature, 8.0),
+    bound("δk", NaturalScale::SolvedCurvature, 16.0),
+    bound("𝓐", NaturalScale::One, 8.0),
+    bound("𝓑", NaturalScale::One, 8.0),
+    bound("𝓓", NaturalScale::One, 8.0),
+    bound("𝓔", NaturalScale::One, 8.0),
+    bound("weight of x", NaturalScale::Weight, 8.0),
+    bound("right-hand side of x", NaturalScale::Length, 8.0),
+    bound("right-hand side of y", NaturalScale::Length, 8.0),
+    bound("δx", NaturalScale::SolvedPosition, 16.0),
+    bound("δy", NaturalScale::SolvedPosition, 16.0),
+    bound("k", NaturalScale::SolvedCurvature, 16.0),
 ];
 
 /// The curve after a run.
 pub const FIELDS: [Bound; 4] = [
-    bound("x", NaturalScale::Position, 16.0, 64.0),
-    bound("y", NaturalScale::Position, 16.0, 64.0),
-    bound("k", NaturalScale::SolvedCurvature, 16.0, 64.0),
-    bound("r", NaturalScale::Length, 16.0, 64.0),
+    bound("x", NaturalScale::Position, 16.0),
+    bound("y", NaturalScale::Position, 16.0),
+    bound("k", NaturalScale::SolvedCurvature, 16.0),
+    bound("r", NaturalScale::Length, 16.0),
 ];
 
 /// The members' reports after a run: the fields of `Observed`, then the turning number and the travel.
 pub const REPORT: [Bound; Observed::<f64>::FIELDS.len() + 2] = [
-    bound("length", NaturalScale::Position, 16.0, 64.0),
-    bound("area", NaturalScale::Area, 16.0, 64.0),
-    bound("excess", NaturalScale::One, 16.0, 64.0),
-    bound("energy", NaturalScale::Energy, 16.0, 64.0),
-    bound("k_min", NaturalScale::SolvedCurvature, 16.0, 64.0),
-    bound("k_max", NaturalScale::SolvedCurvature, 16.0, 64.0),
-    bound("mesh ratio", NaturalScale::Mesh, 16.0, 64.0),
-    bound("metric drift", NaturalScale::Mesh, 16.0, 64.0),
-    bound("turning", NaturalScale::One, 0.0, 0.0),
-    bound("travel", NaturalScale::Position, 16.0, 64.0),
+    bound("length", NaturalScale::Position, 16.0),
+    bound("area", NaturalScale::Area, 16.0),
+    bound("excess", NaturalScale::One, 16.0),
+    bound("energy", NaturalScale::Energy, 16.0),
+    bound("k_min", NaturalScale::SolvedCurvature, 16.0),
+    bound("k_max", NaturalScale::SolvedCurvature, 16.0),
+    bound("mesh ratio", NaturalScale::Mesh, 16.0),
+    bound("metric drift", NaturalScale::Mesh, 16.0),
+    bound("turning", NaturalScale::One, 0.0),
+    bound("travel", NaturalScale::Position, 16.0),
 ];
 
 /// What a run records of the decay of its excess: the values at the times of the grid, and the fitted rate.
@@ -108,7 +109,7 @@ pub const REPORT: [Bound; Observed::<f64>::FIELDS.len() + 2] = [
 /// The error of an excess is its rounding and, inside an adaptive run, the effect of a changed step length. The error
 /// of its logarithm is that over the excess; the error of the slope of a line is twice that over the time it spans.
 pub const DECAY: [Bound; 2] =
-    [bound("excess on the way", NaturalScale::One, 16.0, 64.0), bound("fitted rate", NaturalScale::One, 32.0, 128.0)];
+    [bound("excess on the way", NaturalScale::One, 16.0), bound("fitted rate", NaturalScale::One, 32.0)];
 
 /// What adaptive runs leave in addition to their ends: the last step's start and middle, step lengths, and event times.
 ///
@@ -117,17 +118,17 @@ pub const DECAY: [Bound; 2] =
 /// tolerance; the relative error of a step length is a fraction of that. A quantity inside the run is off by this
 /// fraction of its change over a step, in addition to its own scale.
 pub const PACE: [Bound; 6] = [
-    bound("last step's start", NaturalScale::Position, 16.0, 64.0),
-    bound("its middle", NaturalScale::Position, 16.0, 64.0),
-    bound("report of its start", NaturalScale::One, 16.0, 64.0),
-    bound("last step", NaturalScale::One, 4.0, 16.0),
-    bound("next step", NaturalScale::One, 4.0, 16.0),
-    bound("t_half, t_relax", NaturalScale::One, 1.0, 4.0),
+    bound("last step's start", NaturalScale::Position, 16.0),
+    bound("its middle", NaturalScale::Position, 16.0),
+    bound("report of its start", NaturalScale::One, 16.0),
+    bound("last step", NaturalScale::One, 4.0),
+    bound("next step", NaturalScale::One, 4.0),
+    bound("t_half, t_relax", NaturalScale::One, 1.0),
 ];
 
 /// The time at which a watched observable reaches its level: a multiple of the time that the observable needs for its
 /// rounding, by its bound in [`REPORT`], and of the effect of a changed step length.
-pub const EVENT: Bound = bound("event", NaturalScale::One, 1.0, 4.0);
+pub const EVENT: Bound = bound("event", NaturalScale::One, 1.0);
 
 /// The growth of roundings over steps: like a random walk, since the flow itself damps them.
 pub fn growth(steps: u32) -> f64 {
@@ -153,7 +154,7 @@ pub fn excess_time<T: Real>(hardware: bool, steps: u32, slope: f64) -> f64 {
 impl Bound {
     /// Returns the factor k for this kind of adapter.
     pub fn factor(&self, hardware: bool) -> f64 {
-        if hardware { self.hardware } else { self.software }
+        if hardware { ON_HARDWARE * self.software } else { self.software }
     }
 }
 

@@ -270,7 +270,12 @@ pub struct Panel<'a> {
     pub labels_x: bool,
 }
 
-impl Panel<'_> {
+impl<'a> Panel<'a> {
+    /// A panel without a heading, with labels on both axes.
+    pub fn new(corner: DVec2, size: DVec2, [x, y]: [&'a Axis; 2]) -> Panel<'a> {
+        Panel { heading: String::new(), corner, size, x, y, labels_x: true }
+    }
+
     /// Space needed at the left of a panel of this height.
     pub fn left(y: &Axis, height: f64) -> f64 {
         let labels = y.ticks_upwards(height).labelled.into_iter().map(|(_, label)| width(&label, SIZE));

@@ -35,24 +35,8 @@ const DENSE: f64 = 6.0;
 /// Width of an entry of the legend, in pixels.
 const ENTRY: f64 = 104.0;
 
-const LIGHT: &str = "\
-.line { fill: none; stroke-width: 1.1; stroke-linejoin: round }
-.nodes { fill: none; stroke-width: 3.8; stroke-linecap: round }
-.dense { stroke-width: 2.6 }
-.c0 path { stroke: #24292f }
-.c1 path { stroke: #c25100 }
-.c2 path { stroke: #00855f }
-.c3 path { stroke: #b0569a }
-.c4 path { stroke: #0072b2 }
-";
-
-const DARK: &str = "\
-.c0 path { stroke: #e6edf3 }
-.c1 path { stroke: #f58c3c }
-.c2 path { stroke: #2fc79a }
-.c3 path { stroke: #e39bcb }
-.c4 path { stroke: #56b4e9 }
-";
+const LIGHT: &str = include_str!("style/plot.css");
+const DARK: &str = include_str!("style/plot-dark.css");
 
 /// Number of colours in the style sheet.
 const COLOURS: usize = 5;

@@ -13,34 +13,23 @@ pub type Colour = [u8; 3];
 /// The background.
 pub const WHITE: Colour = [255; 3];
 
-/// Two sizes of letters.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Letters {
-    /// Font size 12 px.
-    Small,
-    /// Font size 15 px.
-    Large,
+/// A size of letters.
+#[derive(Clone, Copy, Debug)]
+pub struct Letters {
+    height: RasterHeight,
+    /// Pixels from the top of a letter's picture to the line on which letters stand.
+    ascent: usize,
 }
 
 impl Letters {
-    fn height(self) -> RasterHeight {
-        match self {
-            Letters::Small => RasterHeight::Size16,
-            Letters::Large => RasterHeight::Size20,
-        }
-    }
+    /// Font size 12 px.
+    pub const SMALL: Letters = Letters { height: RasterHeight::Size16, ascent: 13 };
+    /// Font size 15 px.
+    pub const LARGE: Letters = Letters { height: RasterHeight::Size20, ascent: 16 };
 
     /// Width of each letter, in pixels.
     pub fn advance(self) -> usize {
-        get_raster_width(FontWeight::Regular, self.height())
-    }
-
-    /// Pixels from the top of a letter's picture to the line on which letters stand.
-    fn ascent(self) -> usize {
-        match self {
-            Letters::Small => 13,
-            Letters::Large => 16,
-        }
+        get_raster_width(FontWeight::Regular, self.height)
     }
 
     /// Returns `text`, or as much of its beginning as fits into `most` pixels with two dots.
@@ -96,10 +85,10 @@ impl Raster {
 
     /// Writes `text` with its left end at `at`, on the line y. Letters that the font does not have become `?`.
     pub fn text(&mut self, at: DVec2, text: &str, colour: Colour, letters: Letters) {
-        let top = at.y.round() as i64 - letters.ascent() as i64;
+        let top = at.y.round() as i64 - letters.ascent as i64;
         for (i, c) in text.chars().enumerate() {
             let left = at.x.round() as i64 + (i * letters.advance()) as i64;
-            self.letter((left, top), c, colour, letters.height());
+            self.letter((left, top), c, colour, letters.height);
         }
     }
 
@@ -188,7 +177,7 @@ mod tests {
     #[test]
     fn letters_stand_on_their_line_and_are_cut_at_the_edge() {
         let dark = |text: &str, at: DVec2| {
-            let pixels = picture(|raster| raster.text(at, text, [0; 3], Letters::Small));
+            let pixels = picture(|raster| raster.text(at, text, [0; 3], Letters::SMALL));
             let dark = |i: &usize| pixels[*i][0] < 128;
             (0..800).filter(dark).map(|i| (i % 40, i / 40)).collect::<Vec<_>>()
         };
@@ -203,7 +192,7 @@ mod tests {
 
     #[test]
     fn what_is_too_long_ends_in_two_dots() {
-        let small = |text, most| Letters::Small.shortened(text, most);
+        let small = |text, most| Letters::SMALL.shortened(text, most);
         assert_eq!(small("amplitude", 63.0), "amplitude");
         assert_eq!(small("amplitude", 62.0), "amplit..");
         assert_eq!(small("a b c", 28.0), "a..");

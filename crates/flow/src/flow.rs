@@ -124,9 +124,7 @@ impl Flow {
             self.coefficients().iter().enumerate().map(|(j, c)| (j + 1) as f64 * c * k.powi(j as i32)).sum();
         (m2 - 1.0) * (m2 * k.powi(4) + slope * k * k)
     }
-}
 
-impl Flow {
     /// Returns the time `growth` if a nearly round curve of area `area` grows so that its excess falls as a power of
     /// `growth + t`. Applies to Willmore flow, whose circles have `R⁴ = R₀⁴ + 2t`.
     pub fn growth(&self, area: f64) -> Option<f64> {

@@ -96,10 +96,7 @@ impl Forcing {
             }
         }
     }
-}
 
-/// What theory says of a nearly round curve.
-impl Forcing {
     /// Returns whether anything acts besides the flow.
     pub fn acts(&self) -> bool {
         self.drive.is_some() || self.conserved.is_some()

@@ -10,7 +10,7 @@ use curvelax_flow::{
     flow::Flow,
     scheme::{
         Parameters, State,
-        evolve::{Evolves, Team, evolve},
+        evolve::{Evolves, Team},
         extrapolation::MOST_ORDER,
         member::{NEVER, Observed},
         run::Run,
@@ -101,7 +101,7 @@ fn t_relax_by<T: Evolves>(nodes: &[DVec2], flow: &Flow, geometric: bool, adaptiv
 /// The same with any parameters and by any solver.
 fn t_relax_with<T: Evolves>(nodes: &[DVec2], mut p: Parameters<f64>, method: &Method) -> f64 {
     let n = nodes.len();
-    p.set_levels(&level(-1e18), &level(1e18));
+    (p.low, p.high) = (level(-1e18), level(1e18));
     let start = Run::new(State::<f64>::from_nodes(nodes), p).report.now.excess;
     (p.relax_at, p.half_at, p.follow_to) = (0.01 * start, 0.5 * start, 0.01 * start);
     let mut run: Run<T> = started(nodes, p);
@@ -109,7 +109,7 @@ fn t_relax_with<T: Evolves>(nodes: &[DVec2], mut p: Parameters<f64>, method: &Me
     (run.counters.goal, run.counters.stop_when_relaxed, run.counters.order) = (10_000, 1, MOST_ORDER);
     let mut team = Team::new(Blocks::new(n).unwrap());
     while run.counters.is_running() && run.counters.rejected < 10_000 {
-        evolve(&mut run, method, &mut team, 100);
+        Evolves::evolve(&mut run, method, &mut team, 100);
     }
     assert_ne!(run.counters.relax_step, NEVER, "n = {n}: {:?}, {p:?}", run.counters);
     let p = &run.report.progress;
@@ -126,7 +126,7 @@ fn slopes<T: Evolves>(nodes: &[DVec2]) -> [f64; 2] {
     run.report.progress.next = T::of(2f64.powi(-8));
     (run.counters.goal, run.counters.order) = (1, 2);
     let method = Method::coloured(Solver::Direct, 1);
-    evolve(&mut run, &method, &mut Team::new(Blocks::new(n).unwrap()), 1);
+    Evolves::evolve(&mut run, &method, &mut Team::new(Blocks::new(n).unwrap()), 1);
     let [before, after] = [start, run.report.now].map(|at| (at.length * at.length / at.area).to_f64());
     let excess = run.report.now.excess.to_f64();
     [run.report.progress.slope.to_f64(), (after - before) / (4.0 * PI) / excess]
@@ -208,14 +208,14 @@ fn a_circle_at_rest_stays_one() {
         let mut p = parameters(n, &Flow::SurfaceDiffusion, 1e-3);
         (p.end_high, p.goal_high, p.clock_end, p.relax_at) = (8.0, 8.0, 8.0, -1.0);
         (p.half_at, p.follow_to) = (-1.0, 1e-6);
-        p.set_levels(&level(-1e18), &level(1e18));
+        (p.low, p.high) = (level(-1e18), level(1e18));
         let mut run: Run<f32> = started(&ellipse(n, 1.2), p);
         let before = run.report.now;
         run.report.progress.next = 1e-5;
         (run.counters.goal, run.counters.order) = (10_000, MOST_ORDER);
         let mut team = Team::new(Blocks::new(n).unwrap());
         while run.counters.is_running() && run.report.progress.time_high < 8.0 && run.counters.steps < 10_000 {
-            evolve(&mut run, &Method::coloured(Solver::Direct, 1), &mut team, 100);
+            Evolves::evolve(&mut run, &Method::coloured(Solver::Direct, 1), &mut team, 100);
         }
         let now = run.report.now;
         println!(

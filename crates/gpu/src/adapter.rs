@@ -261,15 +261,6 @@ impl Gpu {
 const FEATURES: wgpu::Features =
     wgpu::Features::SHADER_F64.union(wgpu::Features::SUBGROUP).union(wgpu::Features::TIMESTAMP_QUERY);
 
-/// Result of a wait.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Waited {
-    /// The work is done.
-    Done,
-    /// The work is still in progress.
-    Pending,
-}
-
 impl OpenGpu {
     /// The current moment, from which the time of its work counts.
     pub(super) fn now(&self) -> Moment {
@@ -297,8 +288,8 @@ impl OpenGpu {
         Error::Device(format!("GPU {name}: {fault}; see `curvelax adapters`, or use --backend cpu"))
     }
 
-    /// Waits for the submission, but no longer than `most`.
-    pub(super) fn wait(&self, submission: &wgpu::SubmissionIndex, most: Duration) -> Result<Waited> {
+    /// Waits for the submission, but no longer than `most`. Returns whether it is done.
+    pub(super) fn wait(&self, submission: &wgpu::SubmissionIndex, most: Duration) -> Result<bool> {
         let wait =
             |poll| guarded(|| self.device.poll(poll)).map_err(|fault| self.error(&self.fault().unwrap_or(fault)));
         let polled = wait(wgpu::PollType::Wait { submission_index: Some(submission.clone()), timeout: Some(most) })?;
@@ -308,8 +299,8 @@ impl OpenGpu {
         }
         self.check()?;
         match polled {
-            Ok(_) => Ok(Waited::Done),
-            Err(wgpu::PollError::Timeout) => Ok(Waited::Pending),
+            Ok(_) => Ok(true),
+            Err(wgpu::PollError::Timeout) => Ok(false),
             Err(error) => Err(self.error(&format!("a dispatch was not taken ({error})"))),
         }
     }

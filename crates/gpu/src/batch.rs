@@ -5,11 +5,7 @@ use std::{
     time::Duration,
 };
 
-use super::{
-    abandoned,
-    adapter::{OpenGpu, Waited},
-    clock::Moment,
-};
+use super::{abandoned, adapter::OpenGpu, clock::Moment};
 use curvelax_backend::gpu::{
     Budget,
     mirror::{Binding, Caps, Mirror},
@@ -19,7 +15,10 @@ use curvelax_flow::{number::Real, scheme::run::Run, solver::Blocks};
 
 /// Slots side by side in one dispatch.
 pub(super) struct Batch<T> {
-    buffers: Buffers,
+    /// The buffers, in the order of their bindings.
+    bound: Vec<wgpu::Buffer>,
+    /// One for reading back.
+    staging: wgpu::Buffer,
     bindings: wgpu::BindGroup,
     mirror: Mirror<T>,
     clock: Option<DeviceClock>,
@@ -93,20 +92,25 @@ pub(super) struct Reading {
     mapped: Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
 }
 
-/// The buffers, in the order of their bindings, and one for reading back.
-struct Buffers {
-    bound: Vec<wgpu::Buffer>,
-    staging: wgpu::Buffer,
-}
-
 impl<T: Real> Batch<T> {
     /// Allocates room for `slots` members.
     pub fn new(device: &OpenGpu, pipeline: &wgpu::ComputePipeline, blocks: Blocks, slots: usize, traced: bool) -> Self {
-        let buffers = Buffers::new::<T>(&device.device, blocks, slots, traced);
+        let bound = buffers::<T>(&device.device, blocks, slots, traced);
+        let entries: Vec<_> = (0..)
+            .zip(&bound)
+            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
+            .collect();
+        let bindings = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("evolve"),
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        });
+        let mirror = Mirror::new(blocks, slots);
         Batch {
-            bindings: buffers.bind(&device.device, pipeline),
-            buffers,
-            mirror: Mirror::new(blocks, slots),
+            bound,
+            staging: staging(&device.device, mirror.bytes_back() as u64 + DeviceClock::BYTES),
+            bindings,
+            mirror,
             clock: DeviceClock::new(device),
             flight: None,
         }
@@ -114,8 +118,7 @@ impl<T: Real> Batch<T> {
 
     /// Returns the bytes of its buffers.
     pub fn bytes(&self) -> u64 {
-        let Buffers { bound, staging } = &self.buffers;
-        bound.iter().chain([staging]).map(wgpu::Buffer::size).sum()
+        self.bound.iter().chain([&self.staging]).map(wgpu::Buffer::size).sum()
     }
 
     pub fn mirror(&self) -> &Mirror<T> {
@@ -129,11 +132,11 @@ impl<T: Real> Batch<T> {
     /// Returns where the state of `slot` is stored.
     pub fn state_at(&self, slot: usize) -> (&wgpu::Buffer, u64, u64) {
         let (offset, bytes) = self.mirror.state_at(slot);
-        (self.buffers.at(Binding::States), offset, bytes)
+        (&self.bound[Binding::States as usize], offset, bytes)
     }
 
     pub fn trace(&self) -> Option<&wgpu::Buffer> {
-        self.buffers.bound.get(Binding::Trace as usize)
+        self.bound.get(Binding::Trace as usize)
     }
 
     /// Puts members, each with the rows of its state, into consecutive slots.
@@ -162,9 +165,9 @@ impl<T: Real> Batch<T> {
         if due == 0 {
             return;
         }
-        let Batch { mirror, buffers, clock, .. } = self;
+        let Batch { mirror, bound, staging, clock, .. } = self;
         mirror.upload(budget, caps, |binding, offset, bytes| {
-            device.queue.write_buffer(buffers.at(binding), offset, bytes);
+            device.queue.write_buffer(&bound[binding as usize], offset, bytes);
         });
         let mut encoder = device.device.create_command_encoder(&Default::default());
         let timestamp_writes = clock.as_ref().map(DeviceClock::writes);
@@ -177,10 +180,10 @@ impl<T: Real> Batch<T> {
         if let Some(clock) = clock {
             encoder.resolve_query_set(&clock.times, 0..2, &clock.ticks, 0);
         }
-        let reads = [Binding::Counters, Binding::Reports].map(|binding| buffers.at(binding));
+        let reads = [Binding::Counters, Binding::Reports].map(|binding| &bound[binding as usize]);
         let reads: Vec<_> = reads.into_iter().chain(clock.as_ref().map(|clock| &clock.ticks)).collect();
         let reads: Vec<_> = reads.into_iter().map(|buffer| (buffer, 0, buffer.size())).collect();
-        let back = Reading::submit(device, encoder, &buffers.staging, &reads);
+        let back = Reading::submit(device, encoder, staging, &reads);
         self.flight = Some(Flight { since: device.now(), back });
     }
 
@@ -193,7 +196,7 @@ impl<T: Real> Batch<T> {
     /// a fault, which `finish` reports.
     pub fn is_back(&self, device: &OpenGpu, most: Duration) -> bool {
         let Some(Flight { back, .. }) = &self.flight else { return true };
-        !matches!(device.wait(&back.submission, most), Ok(Waited::Pending))
+        device.wait(&back.submission, most).unwrap_or(true)
     }
 
     /// Waits for the dispatch, if there is one, while it has time `left`, and reads its records.
@@ -232,7 +235,7 @@ impl Reading {
 
     /// Waits for the copy, in progress `since` then, while there is time `left`.
     pub fn wait(self, device: &OpenGpu, since: Moment, left: impl Fn(Moment) -> Duration) -> Result<Vec<u8>> {
-        while device.wait(&self.submission, left(since))? == Waited::Pending {
+        while !device.wait(&self.submission, left(since))? {
             if left(since).is_zero() {
                 let seconds = since.elapsed().as_secs_f64();
                 // To release a device, wgpu waits until it is idle.
@@ -261,37 +264,16 @@ pub(super) fn staging(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor { label: Some("staging"), size, usage, mapped_at_creation: false })
 }
 
-impl Buffers {
-    fn new<T: Real>(device: &wgpu::Device, blocks: Blocks, slots: usize, traced: bool) -> Buffers {
-        let buffer = |binding: Binding| {
-            let kind = match binding {
-                Binding::Dispatch => wgpu::BufferUsages::UNIFORM,
-                _ => wgpu::BufferUsages::STORAGE,
-            };
-            let usage = kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
-            let (label, size) = (Some(binding.name()), binding.bytes::<T>(blocks, slots) as u64);
-            device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+/// The buffers of a batch, in the order of their bindings.
+fn buffers<T: Real>(device: &wgpu::Device, blocks: Blocks, slots: usize, traced: bool) -> Vec<wgpu::Buffer> {
+    let buffer = |binding: Binding| {
+        let kind = match binding {
+            Binding::Dispatch => wgpu::BufferUsages::UNIFORM,
+            _ => wgpu::BufferUsages::STORAGE,
         };
-        let bindings = Binding::ALL.into_iter().filter(|binding| traced || *binding != Binding::Trace);
-        let bound: Vec<wgpu::Buffer> = bindings.map(buffer).collect();
-        let back = [Binding::Counters, Binding::Reports].map(|binding| bound[binding as usize].size());
-        Buffers { staging: staging(device, back.into_iter().sum::<u64>() + DeviceClock::BYTES), bound }
-    }
-
-    fn at(&self, binding: Binding) -> &wgpu::Buffer {
-        &self.bound[binding as usize]
-    }
-
-    fn bind(&self, device: &wgpu::Device, pipeline: &wgpu::ComputePipeline) -> wgpu::BindGroup {
-        let entries: Vec<_> = (0..)
-            .zip(&self.bound)
-            .map(|(binding, buffer)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
-            .collect();
-        let layout = pipeline.get_bind_group_layout(0);
-        device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("evolve"),
-            layout: &layout,
-            entries: &entries,
-        })
-    }
+        let usage = kind | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC;
+        let (label, size) = (Some(binding.name()), binding.bytes::<T>(blocks, slots) as u64);
+        device.create_buffer(&wgpu::BufferDescriptor { label, size, usage, mapped_at_creation: false })
+    };
+    Binding::ALL.into_iter().filter(|binding| traced || *binding != Binding::Trace).map(buffer).collect()
 }

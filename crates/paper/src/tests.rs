@@ -1,12 +1,15 @@
 //! Sizes, letters and bytes of pictures for papers.
 
+#[path = "../../draw/src/charts/tests/samples.rs"]
+mod samples;
+
 use super::*;
 use curvelax_draw::{
-    charts::samples::draw_all,
     medium::Medium,
     svg::Svg,
     width::{SIZE, width},
 };
+use samples::draw_all;
 
 /// A picture of that width with one line of text.
 fn written(text: &str, mm: PaperWidth) -> Print {

@@ -25,7 +25,7 @@ use curvelax::{
     ensemble::{Cell, Ended, Family, Sink, Spec, Status, request::spec::Precision},
     scheme::{
         State,
-        evolve::{Team, evolve},
+        evolve::Team,
         member::{Counters, NEVER},
         run::Run,
         step::Method,
@@ -182,7 +182,7 @@ fn cases<T: Evolves>(index: usize, gpu: &Gpu, solver: Solver) -> Vec<Trial> {
     add("how many slots there are, in how many batches, changes no bit".into(), slots::<T>, 7);
     add("permuted members give permuted results, bit for bit".into(), permutation::<T>, 101);
     add("where a dispatch ends or pauses changes no bit".into(), dispatches::<T>, 101);
-    for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().kernel.shuffles) {
+    for n in sizes(&ONE_SUBGROUP, &FEW_ONE_SUBGROUP).filter(|_| solver.facts().shuffles) {
         add(format!("shuffles and barriers give the same bits, n = {n}"), exchanges::<T>, n);
     }
     add("members that end badly leave the others untouched".into(), bad_members::<T>, 101);
@@ -518,7 +518,7 @@ fn relaxation<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     let mut relaxed = 0;
     for (j, launch) in launches.iter().enumerate() {
         let mut twin: Run<T> = launch.convert();
-        evolve(&mut twin, &method, &mut Team::new(blocks), 60);
+        Evolves::evolve(&mut twin, &method, &mut Team::new(blocks), 60);
         let (ours, theirs) = (ended[j].counters, twin.counters);
         let key = |c: Counters| (c.status, c.steps, c.relax_step, c.half_step);
         if key(ours) != key(theirs) {
@@ -587,7 +587,7 @@ fn paper<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize) -> Outcome {
     launch.parameters.tau = 1e-3;
     let mut exact = launch.clone();
     let method = Method::coloured(Solver::Direct, 1);
-    evolve(&mut exact, &method, &mut Team::new(Blocks::new(n).ok_or("n")?), 2000);
+    Evolves::evolve(&mut exact, &method, &mut Team::new(Blocks::new(n).ok_or("n")?), 2000);
     let Left { state, counters, .. } = on_gpu::<T>(gpu, solver, n, &[launch], dispatches_of(50))?.remove(0);
     if (counters.steps, exact.counters.steps) != (2000, 2000) {
         return Err(format!("{counters:?} on the GPU, {:?} on the CPU", exact.counters).into());

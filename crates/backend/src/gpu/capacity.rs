@@ -61,7 +61,7 @@ impl Capacity {
     /// Returns the fixed-step kernel that suits a ring: sweeps by shuffles if every possible subgroup holds it; for one
     /// size on hardware, and where there is no room for a row per thread.
     pub fn variant(&self, blocks: Blocks, solver: Solver) -> Variant {
-        let subgroup = solver.facts().kernel.shuffles && blocks.count() <= self.least_subgroup as usize;
+        let subgroup = solver.facts().shuffles && blocks.count() <= self.least_subgroup as usize;
         let threads = shader::threads(blocks, self.subgroup);
         let fits = shader::workgroup_bytes::<f64>(threads, Variant::of(solver)) <= self.workgroup_bytes;
         Variant { subgroup, for_one_size: self.for_one_size || !fits, ..Variant::of(solver) }

@@ -38,8 +38,7 @@ impl Variant {
     /// Returns all variants in use, without those that differ only in being watched; traces need only fixed steps,
     /// since adaptive ones are made of them.
     pub fn all() -> Vec<Variant> {
-        let exchanges =
-            |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().kernel.shuffles);
+        let exchanges = |solver: Solver| [false, true].into_iter().filter(move |by| !by || solver.facts().shuffles);
         let exchanging = |solver| exchanges(solver).map(move |subgroup| Variant { subgroup, ..Variant::of(solver) });
         let made_for = |own| [own, Variant { traced: true, ..own }, Variant { adaptive: true, ..own }];
         let geometric = |own| Variant { geometric: true, ..own };
@@ -179,8 +178,7 @@ const PLAN: (usize, usize) = (2, 5);
 ///
 /// Drivers do not reject a kernel that asks for too much, so this is compared with the limit beforehand.
 pub fn workgroup_bytes<T: Real>(rows: usize, variant: Variant) -> usize {
-    let kernel = &variant.solver.facts().kernel;
-    let arrays = if variant.subgroup { 1 } else { kernel.rows_per_block };
+    let arrays = if variant.subgroup { 1 } else { variant.solver.facts().rows_per_block };
     let integers = (PLAN.1 * size_of::<u32>()).next_multiple_of(size_of::<T>());
     (4 * arrays * rows + PLAN.0) * size_of::<T>() + integers + 2 * size_of::<u32>()
 }

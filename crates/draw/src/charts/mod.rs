@@ -75,14 +75,14 @@ fn only_panel(
     heading: &Heading,
     medium: Medium,
     colours: &Colours,
-    [x, y]: [&Axis; 2],
+    axes: [&Axis; 2],
     height: f64,
     layers: impl FnOnce(&mut Svg, &Panel),
 ) -> String {
     let (mut svg, top) = heading.begin(medium, 8.0 + height + FOOT);
-    let left = Panel::left(y, height);
+    let left = Panel::left(axes[1], height);
     let size = DVec2::new(svg.width() - left - MARGIN - colours.room(height), height);
-    let panel = Panel { heading: String::new(), corner: DVec2::new(left, top + 8.0), size, x, y, labels_x: true };
+    let panel = Panel::new(DVec2::new(left, top + 8.0), size, axes);
     panel.draw_axes(&mut svg);
     layers(&mut svg, &panel);
     colours.draw_bar(&mut svg, &panel);
@@ -93,14 +93,14 @@ fn only_panel(
 /// horizontal axis is drawn.
 fn named_rows<'a>(
     svg: &mut Svg,
-    [x, y]: [&'a Axis; 2],
+    axes: [&'a Axis; 2],
     (names, key): (&[String], &str),
     (top, height): (f64, f64),
     room: f64,
 ) -> Panel<'a> {
     let left = MARGIN + 8.0 + names.iter().map(|name| width(name, SIZE)).fold(width(key, SIZE), f64::max);
     let size = DVec2::new(svg.width() - left - MARGIN - room, height);
-    let panel = Panel { heading: String::new(), corner: DVec2::new(left, top), size, x, y, labels_x: true };
+    let panel = Panel::new(DVec2::new(left, top), size, axes);
     panel.draw_x(svg);
     panel
 }
@@ -135,14 +135,12 @@ impl PanelGrid {
     }
 
     /// The panel `i`, with `left` pixels for its labels, if the first row begins at `top`.
-    fn panel<'a>(&self, i: usize, top: f64, left: f64, heading: &str, [x, y]: [&'a Axis; 2]) -> Panel<'a> {
+    fn panel<'a>(&self, i: usize, top: f64, left: f64, heading: &str, axes: [&'a Axis; 2]) -> Panel<'a> {
         let size = DVec2::new(self.width - left, GRID_HEIGHT);
         let corner = self.corner(i, top) + DVec2::new(left, 0.0);
-        Panel { heading: shortened(heading, SIZE, size.x), corner, size, x, y, labels_x: true }
+        Panel { heading: shortened(heading, SIZE, size.x), ..Panel::new(corner, size, axes) }
     }
 }
 
-#[doc(hidden)]
-pub mod samples;
 #[cfg(test)]
 mod tests;

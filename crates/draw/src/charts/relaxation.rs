@@ -62,21 +62,10 @@ impl RelaxationTimes<'_> {
         let share = Axis::new("share relaxed", "", Scale::Linear, (0.0, 1.05));
         let left = Panel::left(&counted, HISTOGRAM).max(Panel::left(&share, SHARE));
         let width = svg.width() - MARGIN - left - colours.room(HISTOGRAM);
-        let above = Panel {
-            heading: String::new(),
-            corner: DVec2::new(left, top + 8.0),
-            size: DVec2::new(width, HISTOGRAM),
-            x: &across,
-            y: &counted,
-            labels_x: false,
-        };
-        let below = Panel {
-            corner: DVec2::new(left, above.end().y + GAP),
-            size: DVec2::new(width, SHARE),
-            y: &share,
-            labels_x: true,
-            ..above.clone()
-        };
+        let (corner, size) = (DVec2::new(left, top + 8.0), DVec2::new(width, HISTOGRAM));
+        let above = Panel { labels_x: false, ..Panel::new(corner, size, [&across, &counted]) };
+        let corner = DVec2::new(left, above.end().y + GAP);
+        let below = Panel::new(corner, DVec2::new(width, SHARE), [&across, &share]);
         [&above, &below].into_iter().for_each(|panel| panel.draw_axes(&mut svg));
         // Behind the bars, whose heights it would hide.
         let shaded = median.and_then(|median| median.interval);

@@ -73,7 +73,7 @@ impl WorkDiagram<'_> {
         for (i, row) in rows.iter().enumerate() {
             for (column, x) in across.iter().enumerate() {
                 let corner = DVec2::new(left + column as f64 * (size.x + GAP), top + HEADING + i as f64 * row_height);
-                let panel = Panel { heading: row.label.clone(), corner, size, x, y: &errors, labels_x: true };
+                let panel = Panel { heading: row.label.clone(), ..Panel::new(corner, size, [x, &errors]) };
                 panel.draw_x(&mut svg);
                 if column == 0 {
                     panel.draw_y(&mut svg);

@@ -82,7 +82,7 @@ impl Vanishing {
     /// Lets the member pause at the level.
     pub(super) fn aim(&self, parameters: &mut Parameters<f64>) {
         parameters.watched = 1.0;
-        parameters.low_length = parameters.low_length.max(self.level);
+        parameters.low.length = parameters.low.length.max(self.level);
     }
 
     /// Whether the curve vanishes, as far as its start tells.
@@ -136,16 +136,17 @@ mod tests {
             Vanishing::new(Flow::SurfaceDiffusion, forcing, (start, 4), 2.0, Precision::F32)
         };
         let own = of(Some("0.5"), &start).unwrap();
-        let mut parameters = Parameters { low_length: -1.0, ..Parameters::default() };
+        let mut parameters = Parameters::default();
+        parameters.low.length = -1.0;
         own.aim(&mut parameters);
-        assert_eq!((parameters.watched, parameters.low_length), (1.0, f64::from(0.4_f32)));
+        assert_eq!((parameters.watched, parameters.low.length), (1.0, f64::from(0.4_f32)));
         // A square with 2A/L = 1 has a radius of √2, and is looked at after 1 of 2√2, in units of the fourth power of
         // 2.
         assert!((own.until - 2_f64.sqrt() / 16.0).abs() < 1e-12);
         // An event at a longer length comes first.
-        parameters.low_length = 3.0;
+        parameters.low.length = 3.0;
         own.aim(&mut parameters);
-        assert_eq!(parameters.low_length, 3.0);
+        assert_eq!(parameters.low.length, 3.0);
         let at = |length| Observed { length, ..Observed::default() };
         assert!(own.is_due(&at(0.3)) && !own.is_due(&at(0.5)));
         let radius = 0.7_f64;

@@ -103,7 +103,7 @@ pub(super) fn aim_at_levels(parameters: &mut Parameters<f64>, watches: &[Watch])
         }
     }
     parameters.watched = f64::from(u8::from(watches.iter().any(Watch::is_pending)));
-    parameters.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
+    (parameters.low, parameters.high) = (Observed::from_numbers(&low), Observed::from_numbers(&high));
 }
 
 #[cfg(test)]
@@ -129,14 +129,14 @@ mod tests {
         assert_eq!(watches.iter().map(|watch| watch.t).collect::<Vec<_>>(), [None, None, None, None, Some(0.0), None]);
         let mut p = Parameters::default();
         aim_at_levels(&mut p, &watches);
-        assert_eq!((p.watched, p.low_length, p.high_length, p.high_k_max), (1.0, 7.0, BIG, 5.0));
-        assert_eq!((p.low_excess, p.low_k_min, p.high_area), (-BIG, -BIG, BIG));
+        assert_eq!((p.watched, p.low.length, p.high.length, p.high.k_max), (1.0, 7.0, BIG, 5.0));
+        assert_eq!((p.low.excess, p.low.k_min, p.high.area), (-BIG, -BIG, BIG));
         watches[1].t = Some(0.1);
         aim_at_levels(&mut p, &watches);
-        assert_eq!((p.low_length, p.high_k_max), (6.0, 5.0));
+        assert_eq!((p.low.length, p.high.k_max), (6.0, 5.0));
         watches.iter_mut().for_each(|watch| watch.t = Some(0.1));
         aim_at_levels(&mut p, &watches);
-        assert_eq!((p.watched, p.low_length), (0.0, -BIG));
+        assert_eq!((p.watched, p.low.length), (0.0, -BIG));
     }
 
     #[test]

@@ -46,18 +46,13 @@ struct Attempt<N: Number> {
     seen: Glance<N>,
 }
 
-/// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
-///
-/// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive step is
-/// retried with a shorter length until that is too short to mean anything. A step that is too inaccurate at every
-/// length follows a curve that n nodes do not resolve; this counts as singular.
-pub fn evolve<T: Evolves>(run: &mut Run<T>, method: &Method, team: &mut Team<T>, attempts: u32) {
-    T::evolve(run, method, team, attempts);
-}
-
-/// A number for which [`evolve`] is compiled, here and not again in every crate that runs members.
+/// A number for which members are advanced, compiled here and not again in every crate that runs members.
 pub trait Evolves: Steps {
-    #[doc(hidden)]
+    /// Advances a running member by at most `attempts` steps towards its goal, including refused ones.
+    ///
+    /// A fixed step that fails (stalled, not finite, singular) ends the member in its last good state. An adaptive step
+    /// is retried with a shorter length until that is too short to mean anything. A step that is too inaccurate at
+    /// every length follows a curve that n nodes do not resolve; this counts as singular.
     fn evolve(run: &mut Run<Self>, method: &Method, team: &mut Team<Self>, attempts: u32);
 }
 
@@ -131,13 +126,12 @@ impl<N: Number> Team<N> {
     }
 
     fn with(work: Workspace<N>) -> Team<N> {
-        let stride = Stride { length: N::Real::of(0.0), high: N::Real::of(0.0), low: N::Real::of(0.0), last: false };
         Team {
             state: State::zeros(work.blocks.n),
             parameters: Parameters::default(),
             excess: N::default(),
             turning: N::default(),
-            strides: vec![stride; N::LANES],
+            strides: vec![Stride::default(); N::LANES],
             shares: AllShares::computed(),
             work,
         }
@@ -161,7 +155,7 @@ impl<N: Number> Team<N> {
     /// Copies a member back from its lane, with its report.
     #[inline(always)]
     fn let_out(&self, lane: usize, run: &mut Run<N::Real>, adaptive: bool) {
-        let fields = self.state.fields().into_iter().zip(run.state.fields_mut()).take(LASTING_FIELDS);
+        let fields = self.state.fields().zip(run.state.fields_mut()).take(LASTING_FIELDS);
         for (field, (from, to)) in fields.enumerate() {
             // An adaptive step begins without increments; those of its last row depend on the orders of other lanes.
             if adaptive && (CURVE_FIELDS..CURVE_FIELDS + INCREMENT_FIELDS).contains(&field) {
@@ -200,8 +194,6 @@ impl<N: Number> Team<N> {
             let (gaps, blocks) = (&state.gaps, work.blocks);
             errors =
                 extrapolation::errors_of_attempt(gaps, &work.new, seen.length, followed, parameters, branches, blocks);
-        }
-        if branches.adaptive {
             let (slope, bend) = (&state.slope_before, &state.bend_before);
             decline = observe::decline(&work.new, slope, bend, &seen, parameters, branches.law, work.blocks);
         }
@@ -309,8 +301,9 @@ impl<N: Number> Team<N> {
             count_sweeps(&mut run.counters, &attempt.stepped, lane);
             let (stride, errors) = (self.strides[lane], attempt.errors.map(|error| error.lane(lane)));
             run.counters.solves += if adaptive { extrapolation::parts::<N::Real>(run.counters.order) } else { 1 };
-            let of_solves = failure_of_solves(&attempt.stepped, lane);
-            let failure = of_solves.or(failure_of_curve(finite.lane(lane), singular.lane(lane)));
+            let Stepped { solved, finite: solves_finite, .. } = attempt.stepped;
+            let of_solves = failure(solves_finite.lane(lane), solved.lane(lane), Status::Stalled);
+            let failure = of_solves.or(failure(finite.lane(lane), !singular.lane(lane), Status::Singular));
             let length = run.report.now.length;
             let allowed = adaptive.then(|| Allowed {
                 error: pace::allowed(
@@ -394,7 +387,7 @@ impl<N: Number> Team<N> {
                 _ => &state.part,
             };
             let sums = observe::sums(curve, parameters, branches.law, work.blocks);
-            seen[look] = observe::observed(&sums, &observe::maxima(curve, parameters));
+            seen[look] = observe::observed(&sums, curve, parameters);
         }
         let passed = if adaptive { observe::passes_level(&seen, parameters) } else { N::Mask::all_of(false) };
         [observe::reaches_level(&seen[last], parameters), passed]
@@ -459,22 +452,12 @@ fn count_sweeps<N: Number>(counters: &mut Counters, stepped: &Stepped<N>, lane: 
     counters.sweeps_x = counters.sweeps_x.saturating_add(stepped.sweeps_x.lane(lane).to_f64() as u32);
 }
 
-/// The failure of the solves of a step, if any.
-#[inline(always)]
-fn failure_of_solves<N: Number>(stepped: &Stepped<N>, lane: usize) -> Option<Status> {
-    match (stepped.finite.lane(lane), stepped.solved.lane(lane)) {
+/// The failure of solves, or of the curve after them, if any: of what is finite but not `sound` it is `unsound`.
+fn failure(finite: bool, sound: bool, unsound: Status) -> Option<Status> {
+    match (finite, sound) {
         (false, _) => Some(Status::Nonfinite),
-        (true, false) => Some(Status::Stalled),
+        (true, false) => Some(unsound),
         (true, true) => None,
-    }
-}
-
-/// The failure of a curve after a solved step, if any.
-fn failure_of_curve(finite: bool, singular: bool) -> Option<Status> {
-    match (finite, singular) {
-        (false, _) => Some(Status::Nonfinite),
-        (true, true) => Some(Status::Singular),
-        (true, false) => None,
     }
 }
 

@@ -17,7 +17,7 @@
 use super::{
     Branches, Curve, Parameters, State,
     run::Run,
-    state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from},
+    state::{self, CURVE_FIELDS, GAP_FIELDS, Gaps, change_from, is_of_places},
 };
 use crate::{
     number::{BIG, Number, Real, place::STEP},
@@ -183,7 +183,10 @@ pub fn add_part<N: Number>(
     let State { curve, before, slope_before, bend_before, gaps, .. } = state;
     let changes = new.fields().into_iter().zip(curve.fields());
     let sums = before.fields_mut().into_iter().zip(slope_before.fields_mut()).zip(bend_before.fields_mut());
-    for (field, ((new, old), ((value, slope), bend))) in changes.zip(sums).enumerate() {
+    let errors = gaps.own.fields_mut().into_iter().zip(gaps.lower.fields_mut());
+    let all = changes.zip(sums).zip(errors).enumerate();
+    for (field, (((new, old), ((value, slope), bend)), (gap, lower_gap))) in all {
+        let counts_as_error = left == 0 && (branches.geometric || !is_of_places(field));
         for i in 0..new.len() {
             let change = N::select(busy, change_from(field, old[i], new[i]), N::of(0.0));
             bend[i] += shares.bend * change;
@@ -193,26 +196,9 @@ pub fn add_part<N: Number>(
             if left == 0 {
                 value[i] += shares.value * change;
             }
-        }
-    }
-    if left > 0 {
-        return;
-    }
-    for i in 0..new.len() {
-        let change_k = N::select(busy, change_from(2, curve.k[i], new.k[i]), N::of(0.0));
-        let change_r = N::select(busy, change_from(3, curve.r[i], new.r[i]), N::of(0.0));
-        gaps.k[i] += shares.gap * change_k;
-        gaps.r[i] += shares.gap * change_r;
-        gaps.lower_k[i] += shares.lower_gap * change_k;
-        gaps.lower_r[i] += shares.lower_gap * change_r;
-    }
-    if branches.geometric {
-        let changes = [(&new.x, &curve.x), (&new.y, &curve.y)];
-        for ((new, old), (gap, lower)) in changes.into_iter().zip(gaps.nodes.iter_mut().zip(&mut gaps.lower_nodes)) {
-            for i in 0..new.len() {
-                let change = N::select(busy, change_from(0, old[i], new[i]), N::of(0.0));
+            if counts_as_error {
                 gap[i] += shares.gap * change;
-                lower[i] += shares.lower_gap * change;
+                lower_gap[i] += shares.lower_gap * change;
             }
         }
     }
@@ -260,10 +246,10 @@ pub fn errors_of_attempt<N: Number>(
     let (mut k_max, mut minus_k_min) = (low, low);
     for i in 0..new.len() {
         let ir = p.length_of(new.r[i]).recip();
-        gap_k = gap_k.max(gaps.k[i].bounded_abs());
-        gap_r = gap_r.max((gaps.r[i] * ir).bounded_abs());
-        lower_k = lower_k.max(gaps.lower_k[i].bounded_abs());
-        lower_r = lower_r.max((gaps.lower_r[i] * ir).bounded_abs());
+        gap_k = gap_k.max(gaps.own.k[i].bounded_abs());
+        gap_r = gap_r.max((gaps.own.r[i] * ir).bounded_abs());
+        lower_k = lower_k.max(gaps.lower.k[i].bounded_abs());
+        lower_r = lower_r.max((gaps.lower.r[i] * ir).bounded_abs());
         k_max = k_max.max(new.k[i]);
         minus_k_min = minus_k_min.max(-new.k[i]);
     }
@@ -284,7 +270,7 @@ pub fn errors_of_attempt<N: Number>(
         return errors;
     }
     let unit = length * (scale / size) * N::of(0.5 / std::f64::consts::PI / NODE_WEIGHT);
-    let largest = |of: &[Ring<N>; 2]| {
+    let largest = |of: [&Ring<N>; 2]| {
         let mut largest = N::of(0.0);
         for (first, count) in blocks.iter() {
             let mut sums = [N::of(0.0); 2];
@@ -301,7 +287,7 @@ pub fn errors_of_attempt<N: Number>(
         }
         (largest / unit).bounded_abs()
     };
-    [errors[0].max(largest(&gaps.nodes)), errors[1].max(largest(&gaps.lower_nodes))]
+    [errors[0].max(largest(gaps.own.nodes())), errors[1].max(largest(gaps.lower.nodes()))]
 }
 
 #[cfg(test)]

@@ -179,7 +179,10 @@ mod tests {
     use super::*;
     use crate::{
         flow::Flow,
-        scheme::{State, Workspace, step},
+        scheme::{
+            State, Workspace,
+            step::{Method, Steps},
+        },
         solver::{Blocks, Solver},
     };
     use glam::DVec2;
@@ -201,7 +204,7 @@ mod tests {
         let mut lengths = Vec::new();
         for _ in 0..steps {
             let State { curve, increments, .. } = &mut state;
-            step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
+            Steps::step(curve, increments, &p, &Method::coloured(Solver::Direct, 1), &mut work);
             std::mem::swap(curve, &mut work.new);
             lengths.push((0..nodes.len()).map(|i| edge(curve.nodes(), i)[2]).sum());
         }

@@ -238,7 +238,7 @@ mod tests {
         forcing::{Conserved, Drive, Forcing},
         number::place::NodePlace,
         scheme::{
-            evolve::{Team, evolve},
+            evolve::{Evolves, Team},
             run::Run,
             state::State,
             step::Method,
@@ -264,7 +264,7 @@ mod tests {
         run.counters.goal = 50_000;
         let mut team = Team::new(Blocks::new(nodes.len()).unwrap());
         while run.counters.is_running() {
-            evolve(&mut run, &Method::coloured(Solver::Direct, 1), &mut team, 100);
+            Evolves::evolve(&mut run, &Method::coloured(Solver::Direct, 1), &mut team, 100);
         }
         run
     }

@@ -15,49 +15,68 @@ pub const PARTS: usize = 32;
 /// Times between the parts.
 pub const TIMES: usize = PARTS - 1;
 
-/// A struct of numbers of one type, arrays first, convertible to and from one array in declaration order.
+/// A struct of numbers of one type: first structs of such numbers, then arrays, then single ones. It is convertible to
+/// and from one array in declaration order.
 macro_rules! numbers {
-    ($(#[$outer:meta])* $name:ident $([$($(#[$about:meta])* $array:ident: $size:expr),+])? {
-        $($(#[$inner:meta])* $field:ident),+ $(,)?
-    }) => {
+    ($(#[$outer:meta])* $name:ident
+        $(($($(#[$of_part:meta])* $part:ident: $struct:ident),+ $(,)?))?
+        $([$($(#[$of_array:meta])* $array:ident: $size:expr),+ $(,)?])?
+        { $($(#[$inner:meta])* $field:ident),* $(,)? }
+    ) => {
         $(#[$outer])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
         #[repr(C)]
         pub struct $name<N> {
-            $($($(#[$about])* pub $array: [N; $size],)+)?
-            $($(#[$inner])* pub $field: N),+
+            $($($(#[$of_part])* pub $part: $struct<N>,)+)?
+            $($($(#[$of_array])* pub $array: [N; $size],)+)?
+            $($(#[$inner])* pub $field: N,)*
         }
 
         impl<N: Copy> $name<N> {
             /// Field names in memory order.
-            pub const FIELDS: &'static [&'static str] = &[$($(stringify!($array),)+)? $(stringify!($field)),+];
+            pub const FIELDS: &'static [&'static str] =
+                &[$($(stringify!($part),)+)? $($(stringify!($array),)+)? $(stringify!($field)),*];
             /// Numbers of all fields.
-            pub const LEN: usize = Self::FIELDS.len() $($(+ $size - { let _ = stringify!($array); 1 })+)?;
+            pub const LEN: usize = size_of::<$name<u8>>();
 
             /// Returns the numbers of the fields in memory order.
             pub fn to_numbers(&self) -> Vec<N> {
                 let mut all = Vec::with_capacity(Self::LEN);
+                $($(all.extend(self.$part.to_numbers());)+)?
                 $($(all.extend(self.$array);)+)?
-                all.extend([$(self.$field),+]);
+                all.extend_from_slice(&[$(self.$field),*]);
                 all
             }
 
             /// Creates the struct from the numbers of its fields in memory order, [`Self::LEN`] of them.
             pub fn from_numbers(numbers: &[N]) -> Self {
                 let rest = numbers;
+                $($(
+                    let ($part, rest) = rest.split_at($struct::<N>::LEN);
+                    let $part = $struct::from_numbers($part);
+                )+)?
                 $($(let ($array, rest) = rest.split_first_chunk().expect(stringify!($array));)+)?
-                let [$($field),+] = *rest else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
-                $name { $($($array: *$array,)+)? $($field),+ }
+                let [$($field),*] = *rest else { panic!("{} numbers for {}", numbers.len(), stringify!($name)) };
+                $name { $($($part,)+)? $($($array: *$array,)+)? $($field),* }
+            }
+        }
+
+        impl<T: Real> $name<T> {
+            /// Converts the numbers to another precision, rounding.
+            pub fn convert<U: Real>(&self) -> $name<U> {
+                let numbers: Vec<U> = self.to_numbers().into_iter().map(|number| U::of(number.to_f64())).collect();
+                $name::from_numbers(&numbers)
             }
         }
 
         impl<N: Number> $name<N> {
             /// Sets one lane of every field.
             pub fn set_lane(&mut self, lane: usize, values: &$name<N::Real>) {
+                $($(self.$part.set_lane(lane, &values.$part);)+)?
                 $($(for (to, from) in self.$array.iter_mut().zip(values.$array) {
                     to.set_lane(lane, from);
                 })+)?
-                $(self.$field.set_lane(lane, values.$field);)+
+                $(self.$field.set_lane(lane, values.$field);)*
             }
         }
     };
@@ -65,9 +84,14 @@ macro_rules! numbers {
 
 numbers! {
     /// Parameters of one member.
-    Parameters [
+    Parameters (
+        /// Where the member pauses if it is watched: an observable at or below its level here.
+        low: Observed,
+        /// An observable at or above its level here.
+        high: Observed,
+    ) [
         /// The numbers of the law; see [`Flow::law`].
-        law: LAW
+        law: LAW,
     ] {
         /// Length τ of a fixed step, or of the current step if steps are adaptive.
         tau,
@@ -120,40 +144,8 @@ numbers! {
         fit_to,
         /// The time `growth` if the excess falls as a power of `growth + t`; 0 if it falls exponentially.
         growth,
-        /// 1: the member pauses where an observable is at or below its `low_` level, or at or above its `high_` one.
+        /// 1: the member pauses where an observable is at or below its level in `low`, or at or above that in `high`.
         watched,
-        /// Length at or below which the member pauses.
-        low_length,
-        /// Area at or below which the member pauses.
-        low_area,
-        /// Excess at or below which the member pauses.
-        low_excess,
-        /// Energy at or below which the member pauses.
-        low_energy,
-        /// Smallest curvature at or below which the member pauses.
-        low_k_min,
-        /// Largest curvature at or below which the member pauses.
-        low_k_max,
-        /// Mesh ratio at or below which the member pauses.
-        low_mesh_ratio,
-        /// Metric drift at or below which the member pauses.
-        low_metric_drift,
-        /// Length at or above which it does.
-        high_length,
-        /// Area at or above which it does.
-        high_area,
-        /// Excess at or above which it does.
-        high_excess,
-        /// Energy at or above which it does.
-        high_energy,
-        /// Smallest curvature at or above which it does.
-        high_k_min,
-        /// Largest curvature at or above which it does.
-        high_k_max,
-        /// Mesh ratio at or above which it does.
-        high_mesh_ratio,
-        /// Metric drift at or above which it does.
-        high_metric_drift,
     }
 }
 
@@ -241,20 +233,21 @@ numbers! {
     }
 }
 
-/// A member's report at the end of a dispatch.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[repr(C)]
-pub struct Report<N> {
-    /// The curve before the last step.
-    pub before: Observed<N>,
-    /// The last accepted curve; only the excess is known before the first step.
-    pub now: Observed<N>,
-    /// Its time and events.
-    pub progress: Progress<N>,
-    /// The decay of its excess.
-    pub decay: Decay<N>,
-    /// Its excess at the first `noted` times of the grid of [`decay`](super::decay).
-    pub excess_at: [N; TIMES],
+numbers! {
+    /// A member's report at the end of a dispatch.
+    Report (
+        /// The curve before the last step.
+        before: Observed,
+        /// The last accepted curve; only the excess is known before the first step.
+        now: Observed,
+        /// Its time and events.
+        progress: Progress,
+        /// The decay of its excess.
+        decay: Decay,
+    ) [
+        /// Its excess at the first `noted` times of the grid of [`decay`](super::decay).
+        excess_at: TIMES,
+    ] {}
 }
 
 /// No such step.
@@ -324,92 +317,9 @@ impl Parameters<f64> {
     }
 }
 
-impl<T: Copy> Parameters<T> {
-    /// Sets the levels at which the member pauses if it is watched.
-    pub fn set_levels(&mut self, low: &Observed<T>, high: &Observed<T>) {
-        (self.low_length, self.high_length) = (low.length, high.length);
-        (self.low_area, self.high_area) = (low.area, high.area);
-        (self.low_excess, self.high_excess) = (low.excess, high.excess);
-        (self.low_energy, self.high_energy) = (low.energy, high.energy);
-        (self.low_k_min, self.high_k_min) = (low.k_min, high.k_min);
-        (self.low_k_max, self.high_k_max) = (low.k_max, high.k_max);
-        (self.low_mesh_ratio, self.high_mesh_ratio) = (low.mesh_ratio, high.mesh_ratio);
-        (self.low_metric_drift, self.high_metric_drift) = (low.metric_drift, high.metric_drift);
-    }
-}
-
-impl<T: Real> Parameters<T> {
-    /// Converts the parameters to another precision, rounding.
-    pub fn convert<U: Real>(&self) -> Parameters<U> {
-        Parameters::from_numbers(&convert(self.to_numbers()))
-    }
-}
-
-fn convert<T: Real, U: Real>(numbers: Vec<T>) -> Vec<U> {
-    numbers.into_iter().map(|v| U::of(v.to_f64())).collect()
-}
-
-impl<T: Real> Report<T> {
-    /// Returns all numbers in memory order.
-    pub fn to_numbers(&self) -> Vec<T> {
-        let Report { before, now, progress, decay, excess_at } = self;
-        let observed = [before, now].into_iter().flat_map(Observed::to_numbers);
-        let rest = [progress.to_numbers(), decay.to_numbers(), excess_at.to_vec()].into_iter().flatten();
-        observed.chain(rest).collect()
-    }
-
-    /// Inverts [`Report::to_numbers`].
-    pub fn from_numbers(numbers: &[T]) -> Report<T> {
-        let mut rest = numbers;
-        let mut next = |fields: usize| {
-            let (first, others) = rest.split_at(fields);
-            rest = others;
-            first
-        };
-        let mut observed = || Observed::from_numbers(next(Observed::<T>::FIELDS.len()));
-        let (before, now) = (observed(), observed());
-        let progress = Progress::from_numbers(next(Progress::<T>::FIELDS.len()));
-        let decay = Decay::from_numbers(next(Decay::<T>::FIELDS.len()));
-        let mut excess_at = [T::of(0.0); TIMES];
-        excess_at.copy_from_slice(next(TIMES));
-        Report { before, now, progress, decay, excess_at }
-    }
-
-    /// Length of the array of numbers.
-    pub const LEN: usize =
-        2 * Observed::<T>::FIELDS.len() + Progress::<T>::FIELDS.len() + Decay::<T>::FIELDS.len() + TIMES;
-
-    /// Converts the report to another precision, rounding.
-    pub fn convert<U: Real>(&self) -> Report<U> {
-        Report::from_numbers(&convert(self.to_numbers()))
-    }
-}
-
 impl Counters {
     /// Returns whether the member has steps to make.
     pub fn is_running(&self) -> bool {
         self.status == 0 && self.steps < self.goal
     }
-
-    /// Field names in memory order.
-    pub const FIELDS: [&'static str; 18] = [
-        "status",
-        "steps",
-        "rejected",
-        "refused",
-        "order",
-        "solves",
-        "goal",
-        "stop_when_relaxed",
-        "relax_step",
-        "half_step",
-        "sweeps_k",
-        "sweeps_x",
-        "phase",
-        "solve_sweeps",
-        "fit_points",
-        "fit_over",
-        "noted",
-        "passed",
-    ];
 }

@@ -1,6 +1,6 @@
 //! The semi-implicit Lagrangian scheme of Mikula and Ševčovič, written once, generic over the number.
 //!
-//! *Theory.* One step of length τ ([`step`](step::step)) goes through four stages, each in its own file with a
+//! *Theory.* One step of length τ ([`step`](step::Steps::step)) goes through four stages, each in its own file with a
 //! WGSL twin of the same stem in `shaders/`:
 //!
 //! 1. [`redistribution`]: velocity β and tangential velocity α of the old state, then the new lengths r;

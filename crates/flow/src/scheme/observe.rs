@@ -50,21 +50,6 @@ pub struct CurveSums<N> {
     pub excess: N,
 }
 
-/// The maxima; a value that is not finite shows as more than [`BIG`].
-#[derive(Clone, Copy, Debug)]
-pub struct Maxima<N> {
-    /// `max |r_i - |e_i|| / |e_i|`.
-    pub drift: N,
-    /// Longest edge.
-    pub longest: N,
-    /// Minus the shortest edge.
-    pub minus_shortest: N,
-    /// Largest curvature.
-    pub k_max: N,
-    /// Minus the smallest curvature.
-    pub minus_k_min: N,
-}
-
 /// What every step is judged by: the decisive part of the sums and maxima, without a division.
 #[derive(Clone, Copy, Debug)]
 pub struct Glance<N> {
@@ -164,22 +149,6 @@ pub fn sums<N: Number>(curve: &Curve<N>, p: &Parameters<N>, kind: Kind, blocks: 
     CurveSums { length, area, energy, turning, tension, excess }
 }
 
-/// Computes the maxima over the ring.
-#[inline(always)]
-pub fn maxima<N: Number>(curve: &Curve<N>, p: &Parameters<N>) -> Maxima<N> {
-    let low = N::of(-2.0 * BIG);
-    let mut m = Maxima { drift: low, longest: low, minus_shortest: low, k_max: low, minus_k_min: low };
-    for i in 0..curve.x.len() {
-        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve.nodes(), i)[2]);
-        m.drift = m.drift.max(((r - e) / e).bounded_abs());
-        m.longest = m.longest.max(e.bounded_abs());
-        m.minus_shortest = m.minus_shortest.max(-e.bounded_abs());
-        m.k_max = m.k_max.max(k);
-        m.minus_k_min = m.minus_k_min.max(-k);
-    }
-    m
-}
-
 /// The first and the second derivative of ln excess along a step, by those of the nodes of the curve at its end.
 ///
 /// With length L, area A and Q = L²/(4π|A|), (ln Q)' is 2L'/L - A'/A. Of a crystal, `γ|e|` stands for the length of an
@@ -264,33 +233,43 @@ fn winding<N: Number>(curve: &Curve<N>, i: usize) -> N {
 /// Observes a curve.
 #[inline(never)]
 pub fn observe<T: Real>(curve: &Curve<T>, p: &Parameters<T>, blocks: Blocks) -> Observed<T> {
-    observed(&sums(curve, p, p.kind_of_law(), blocks), &maxima(curve, p))
+    observed(&sums(curve, p, p.kind_of_law(), blocks), curve, p)
 }
 
-/// Derives the observables from the sums and maxima of a curve.
+/// The observables of a curve with these sums. A value that is not finite shows as more than [`BIG`].
 #[inline(always)]
-pub fn observed<N: Number>(sums: &CurveSums<N>, maxima: &Maxima<N>) -> Observed<N> {
+pub fn observed<N: Number>(sums: &CurveSums<N>, curve: &Curve<N>, p: &Parameters<N>) -> Observed<N> {
+    let low = N::of(-2.0 * BIG);
+    let (mut drift, mut longest, mut minus_shortest, mut k_max, mut minus_k_min) = (low, low, low, low, low);
+    for i in 0..curve.x.len() {
+        let (k, r, e) = (curve.k[i], p.length_of(curve.r[i]), edge(curve.nodes(), i)[2]);
+        drift = drift.max(((r - e) / e).bounded_abs());
+        longest = longest.max(e.bounded_abs());
+        minus_shortest = minus_shortest.max(-e.bounded_abs());
+        k_max = k_max.max(k);
+        minus_k_min = minus_k_min.max(-k);
+    }
     Observed {
         length: sums.length,
         area: sums.area,
         excess: sums.excess,
         energy: sums.energy,
-        k_min: -maxima.minus_k_min,
-        k_max: maxima.k_max,
-        mesh_ratio: maxima.longest / -maxima.minus_shortest,
-        metric_drift: maxima.drift,
+        k_min: -minus_k_min,
+        k_max,
+        mesh_ratio: longest / -minus_shortest,
+        metric_drift: drift,
     }
 }
 
 /// Whether an observable has reached a level at which the member pauses.
 #[inline(always)]
 pub fn reaches_level<N: Number>(at: &Observed<N>, p: &Parameters<N>) -> N::Mask {
-    let fell = at.length.le(p.low_length).or(at.area.le(p.low_area)).or(at.excess.le(p.low_excess));
-    let fell = fell.or(at.energy.le(p.low_energy)).or(at.k_min.le(p.low_k_min)).or(at.k_max.le(p.low_k_max));
-    let fell = fell.or(at.mesh_ratio.le(p.low_mesh_ratio)).or(at.metric_drift.le(p.low_metric_drift));
-    let rose = p.high_length.le(at.length).or(p.high_area.le(at.area)).or(p.high_excess.le(at.excess));
-    let rose = rose.or(p.high_energy.le(at.energy)).or(p.high_k_min.le(at.k_min)).or(p.high_k_max.le(at.k_max));
-    fell.or(rose).or(p.high_mesh_ratio.le(at.mesh_ratio)).or(p.high_metric_drift.le(at.metric_drift))
+    let fell = at.length.le(p.low.length).or(at.area.le(p.low.area)).or(at.excess.le(p.low.excess));
+    let fell = fell.or(at.energy.le(p.low.energy)).or(at.k_min.le(p.low.k_min)).or(at.k_max.le(p.low.k_max));
+    let fell = fell.or(at.mesh_ratio.le(p.low.mesh_ratio)).or(at.metric_drift.le(p.low.metric_drift));
+    let rose = p.high.length.le(at.length).or(p.high.area.le(at.area)).or(p.high.excess.le(at.excess));
+    let rose = rose.or(p.high.energy.le(at.energy)).or(p.high.k_min.le(at.k_min)).or(p.high.k_max.le(at.k_max));
+    fell.or(rose).or(p.high.mesh_ratio.le(at.mesh_ratio)).or(p.high.metric_drift.le(at.metric_drift))
 }
 
 /// Whether a value above `level` at both ends of a step may have reached it inside, by the values at the start, at the
@@ -310,18 +289,18 @@ pub fn falls_inside<N: Number>([start, early, late, end]: [N; 4], level: N) -> N
 /// the two [`LOOKS`] and at the end. Where the host looks closely, it may turn out that none has.
 #[inline(always)]
 pub fn passes_level<N: Number>(at: &[Observed<N>; 4], p: &Parameters<N>) -> N::Mask {
-    let passes = |of: fn(&Observed<N>) -> N, low: N, high: N| {
+    let passes = |of: fn(&Observed<N>) -> N| {
         let values = at.each_ref().map(of);
-        falls_inside(values, low).or(falls_inside(values.map(|value| -value), -high))
+        falls_inside(values, of(&p.low)).or(falls_inside(values.map(|value| -value), -of(&p.high)))
     };
-    let length = passes(|at| at.length, p.low_length, p.high_length);
-    let area = passes(|at| at.area, p.low_area, p.high_area);
-    let excess = passes(|at| at.excess, p.low_excess, p.high_excess);
-    let energy = passes(|at| at.energy, p.low_energy, p.high_energy);
-    let k_min = passes(|at| at.k_min, p.low_k_min, p.high_k_min);
-    let k_max = passes(|at| at.k_max, p.low_k_max, p.high_k_max);
-    let mesh_ratio = passes(|at| at.mesh_ratio, p.low_mesh_ratio, p.high_mesh_ratio);
-    let metric_drift = passes(|at| at.metric_drift, p.low_metric_drift, p.high_metric_drift);
+    let length = passes(|at| at.length);
+    let area = passes(|at| at.area);
+    let excess = passes(|at| at.excess);
+    let energy = passes(|at| at.energy);
+    let k_min = passes(|at| at.k_min);
+    let k_max = passes(|at| at.k_max);
+    let mesh_ratio = passes(|at| at.mesh_ratio);
+    let metric_drift = passes(|at| at.metric_drift);
     length.or(area).or(excess).or(energy).or(k_min).or(k_max).or(mesh_ratio).or(metric_drift)
 }
 
@@ -346,7 +325,7 @@ mod tests {
                 } else {
                     high[field] = level
                 }
-                p.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
+                (p.low, p.high) = (Observed::from_numbers(&low), Observed::from_numbers(&high));
                 passes_level(&seen(value), &p)
             };
             for turn in [0.07, 0.2, 0.5, 0.9] {

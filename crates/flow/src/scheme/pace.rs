@@ -53,7 +53,7 @@ pub const BEHIND: f64 = 1.0 / 32.0;
 pub const NEAREST_AIM: f64 = 0.125;
 
 /// A step to attempt.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stride<T> {
     /// Its length.
     pub length: T,

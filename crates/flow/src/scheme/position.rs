@@ -180,7 +180,11 @@ mod tests {
     use glam::DVec2;
 
     use super::{
-        super::{State, Workspace, curvature::Curvature, step},
+        super::{
+            State, Workspace,
+            curvature::Curvature,
+            step::{Method, Steps},
+        },
         *,
     };
     use crate::{
@@ -215,7 +219,7 @@ mod tests {
         let mut state = State::<f64>::from_nodes(&nodes);
         let mut work = Workspace::new(Blocks::new(n).unwrap());
         let State { curve, increments, .. } = &mut state;
-        step::step(curve, increments, &p, &step::Method::coloured(Solver::Direct, 1), &mut work);
+        Steps::step(curve, increments, &p, &Method::coloured(Solver::Direct, 1), &mut work);
         [
             mismatch_of(&Curvature::new(curve, &work.new, &work.motion, &p)),
             mismatch_of(&Position::new(curve, &work.new, &work.motion, &p, p.branches())),

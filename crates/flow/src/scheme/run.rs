@@ -47,7 +47,7 @@ impl<T: Real> Run<T> {
     pub fn new(state: State<T>, parameters: Parameters<T>) -> Run<T> {
         let blocks = Blocks::new(state.curve.len()).expect("a ring of 6 nodes or more");
         let sums = observe::sums(&state.curve, &parameters, parameters.kind_of_law(), blocks);
-        let now = observe::observed(&sums, &observe::maxima(&state.curve, &parameters));
+        let now = observe::observed(&sums, &state.curve, &parameters);
         let mut report = Report { before: now, now, ..Report::default() };
         report.progress.turning = sums.turning;
         let counters = Counters { relax_step: NEVER, half_step: NEVER, order: FIRST_ORDER, ..Counters::default() };

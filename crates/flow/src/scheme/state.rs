@@ -56,18 +56,10 @@ pub struct Increments<N> {
 /// The errors of an adaptive attempt so far, as changes of k and r; of the geometric form, of x and y, too.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gaps<N> {
-    /// Of order J-1, in k.
-    pub k: Ring<N>,
-    /// Of order J-1, in r.
-    pub r: Ring<N>,
-    /// Of order J-2, in k.
-    pub lower_k: Ring<N>,
-    /// Of order J-2, in r.
-    pub lower_r: Ring<N>,
-    /// Of order J-1, in x and y.
-    pub nodes: [Ring<N>; 2],
-    /// Of order J-2, in x and y.
-    pub lower_nodes: [Ring<N>; 2],
+    /// Of order J-1.
+    pub own: Curve<N>,
+    /// Of order J-2.
+    pub lower: Curve<N>,
 }
 
 /// A curve in progress: the state of a member between two steps.
@@ -186,21 +178,19 @@ impl<N: Number> Increments<N> {
 impl<N: Number> Gaps<N> {
     /// Creates errors of zero.
     pub fn zeros(n: usize) -> Gaps<N> {
-        let ring = || Ring::zeros(n);
-        let nodes = || [ring(), ring()];
-        Gaps { k: ring(), r: ring(), lower_k: ring(), lower_r: ring(), nodes: nodes(), lower_nodes: nodes() }
+        Gaps { own: Curve::zeros(n), lower: Curve::zeros(n) }
     }
 
     /// Returns the fields in the order in which the device stores them.
     pub fn fields(&self) -> [&Ring<N>; GAP_FIELDS] {
-        let Gaps { k, r, lower_k, lower_r, nodes: [x, y], lower_nodes: [lower_x, lower_y] } = self;
-        [k, r, lower_k, lower_r, x, y, lower_x, lower_y]
+        let Gaps { own: Curve { x, y, k, r }, lower } = self;
+        [k, r, &lower.k, &lower.r, x, y, &lower.x, &lower.y]
     }
 
     /// Returns the fields in the same order, mutably.
     pub fn fields_mut(&mut self) -> [&mut Ring<N>; GAP_FIELDS] {
-        let Gaps { k, r, lower_k, lower_r, nodes: [x, y], lower_nodes: [lower_x, lower_y] } = self;
-        [k, r, lower_k, lower_r, x, y, lower_x, lower_y]
+        let Gaps { own: Curve { x, y, k, r }, lower } = self;
+        [k, r, &mut lower.k, &mut lower.r, x, y, &mut lower.x, &mut lower.y]
     }
 }
 
@@ -229,15 +219,13 @@ impl<N: Number> State<N> {
     }
 
     /// Returns the fields in the order in which the device stores them.
-    pub fn fields(&self) -> [&Ring<N>; STATE_FIELDS] {
+    pub fn fields(&self) -> impl Iterator<Item = &Ring<N>> {
         let State { curve, increments, earlier, slope, bend, before, slope_before, bend_before, part, gaps } = self;
-        let mut all = [&curve.x; STATE_FIELDS];
         let Increments { k, x, y } = increments;
         let Increments { k: ek, x: ex, y: ey } = earlier;
         let first = curve.fields().into_iter().chain([k, x, y, ek, ex, ey]);
         let others = [slope, bend, before, slope_before, bend_before, part].into_iter().flat_map(Curve::fields);
-        all.iter_mut().zip(first.chain(others).chain(gaps.fields())).for_each(|(to, field)| *to = field);
-        all
+        first.chain(others).chain(gaps.fields())
     }
 
     /// Returns the fields in the same order, mutably.
@@ -269,7 +257,7 @@ impl<T: Real> State<T> {
 
     /// Returns all fields one after another: [`STATE_FIELDS`] numbers for each node.
     pub fn to_numbers(&self) -> Vec<T> {
-        self.fields().into_iter().flat_map(|field| field.nodes().iter().copied()).collect()
+        self.fields().flat_map(|field| field.nodes().iter().copied()).collect()
     }
 
     /// Inverts [`State::to_numbers`].
@@ -370,7 +358,7 @@ impl<N: Number> Workspace<N> {
 
     /// Creates a workspace with what the solver `S` needs.
     pub fn for_solver<S: Solves>(blocks: Blocks) -> Workspace<N> {
-        Workspace::with(blocks, S::memory(blocks.n), S::memory(blocks.n))
+        Workspace::with(blocks, Memory::of_solver::<S>(blocks.n), Memory::of_solver::<S>(blocks.n))
     }
 
     /// Returns the numbers that it holds per node.

@@ -39,13 +39,6 @@ impl Status {
 
     /// Returns the word used in `summary.csv`.
     pub fn name(self) -> &'static str {
-        match self {
-            Status::Relaxed => "relaxed",
-            Status::Unfinished => "unfinished",
-            Status::Singular => "singular",
-            Status::Nonfinite => "nonfinite",
-            Status::Stalled => "stalled",
-            Status::Vanished => "vanished",
-        }
+        ["relaxed", "unfinished", "singular", "nonfinite", "stalled", "vanished"][self as usize - 1]
     }
 }

@@ -45,21 +45,10 @@ pub struct Stepped<N: Number> {
 /// Fraction of the rounding error of an unknown below which an error of its increment is not worth a sweep.
 pub const NEGLIGIBLE: f64 = 0.1;
 
-/// Computes the curve a time `p.tau` after `old` into `work.new`; the solves start at `increments`, which returns the
-/// result.
-pub fn step<T: Steps>(
-    old: &Curve<T>,
-    increments: &mut Increments<T>,
-    p: &Parameters<T>,
-    method: &Method,
-    work: &mut Workspace<T>,
-) -> Stepped<T> {
-    T::step(old, increments, p, method, work)
-}
-
-/// A number for which [`step()`] is compiled, here and not again in every crate that makes steps.
+/// A number for which steps are compiled, here and not again in every crate that makes steps.
 pub trait Steps: Real {
-    #[doc(hidden)]
+    /// Computes the curve a time `p.tau` after `old` into `work.new`; the solves start at `increments`, which returns
+    /// the result.
     fn step(
         old: &Curve<Self>,
         increments: &mut Increments<Self>,
@@ -90,8 +79,8 @@ macro_rules! steps {
 
 steps!(f64 f32);
 
-/// Like [`step`], for members side by side that share `branches`, by the solver `S`. Lanes that are not `live` cost no
-/// sweeps and mean nothing afterwards.
+/// Like [`Steps::step`], for members side by side that share `branches`, by the solver `S`. Lanes that are not `live`
+/// cost no sweeps and mean nothing afterwards.
 #[inline(always)]
 pub fn step_by<N: Number, S: Solves>(
     old: &Curve<N>,

@@ -13,7 +13,7 @@
 
 use super::{
     ring::{Blocks, Ring},
-    sweeps::{Control, Order, Swept, Target, coloured_sweep, lexicographic_sweep, norms},
+    sweeps::{Control, Swept, Target, norms, sweep},
     system::System,
 };
 use crate::number::{Mask, Number};
@@ -39,10 +39,7 @@ pub fn solve<N: Number, const F: usize>(
     while done < control.max_sweeps && active.any() {
         let sweeps = SWEEPS_PER_CHECK.min(control.max_sweeps - done);
         for _ in 0..sweeps {
-            match control.order {
-                Order::Coloured => coloured_sweep(system, &mut unknown, blocks, sor, active),
-                Order::Lexicographic => lexicographic_sweep(system, &mut unknown, sor, active),
-            }
+            sweep(system, &mut unknown, blocks, control.order, sor, active);
         }
         done += sweeps;
         swept.sweeps += N::select(active, N::of(f64::from(sweeps)), N::of(0.0));
@@ -78,10 +75,7 @@ pub fn sweep_round<N: Number, const F: usize>(
         if !active.any() {
             break;
         }
-        match control.order {
-            Order::Coloured => coloured_sweep(system, &mut lacks, blocks, sor, active),
-            Order::Lexicographic => lexicographic_sweep(system, &mut lacks, sor, active),
-        }
+        sweep(system, &mut lacks, blocks, control.order, sor, active);
         done += 1;
     }
     Swept { sweeps: N::select(fits, sweeps, N::of(0.0)), converged: fits, finite: target.finite }
@@ -112,7 +106,7 @@ pub const AUTO_SCALE: f64 = 0.625;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::{direct, sweeps::largest, system::tests::test_system};
+    use crate::solver::{Order, direct, sweeps::largest, system::tests::test_system};
 
     fn control(order: Order, sor: f64) -> Control<f64> {
         Control { tolerance: 1e-12, negligible: 0.0, sor, max_sweeps: 100_000, order, refined: false, refinements: 0.0 }

@@ -54,15 +54,7 @@ impl Solver {
     pub const ALL: [Solver; 2] = [Solver::GaussSeidel, Solver::Direct];
 
     /// Their names, in the same order.
-    pub const NAMES: [&str; Solver::ALL.len()] = {
-        let mut names = [""; Solver::ALL.len()];
-        let mut i = 0;
-        while i < names.len() {
-            names[i] = Solver::ALL[i].name();
-            i += 1;
-        }
-        names
-    };
+    pub const NAMES: [&str; Solver::ALL.len()] = [Solver::ALL[0].name(), Solver::ALL[1].name()];
 
     /// Returns what the rest of the program knows about it.
     pub const fn facts(self) -> &'static Facts {
@@ -113,9 +105,6 @@ pub trait Solves: 'static {
     /// What the rest of the program knows about it.
     const FACTS: Facts;
 
-    /// Allocates its memory, apart from the unknowns, for systems of `n` equations.
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F>;
-
     /// Solves `system` for `unknown`, one ring per right-hand side, in the lanes that are `live`; sweeps start from the
     /// values of `unknown`. Other lanes cost no sweeps and mean nothing afterwards.
     fn solve<N: Number, const F: usize>(
@@ -159,16 +148,9 @@ pub struct Facts {
     pub numbers_per_node: usize,
     /// How many more it stores in short numbers, whose solutions are refined.
     pub numbers_to_refine: usize,
-    /// What the kernel needs to know about it.
-    pub kernel: KernelFacts,
-}
-
-/// What the kernel needs to know about a solver.
-#[derive(Debug)]
-pub struct KernelFacts {
-    /// Whether a member that is one subgroup may exchange by shuffles.
+    /// Whether a member that is one subgroup of the kernel may exchange by shuffles.
     pub shuffles: bool,
-    /// Rows of four numbers per block in workgroup memory, where threads exchange by barriers.
+    /// Rows of four numbers per block in the kernel's workgroup memory, where threads exchange by barriers.
     pub rows_per_block: usize,
 }
 
@@ -182,14 +164,14 @@ pub struct Memory<N, const F: usize> {
 }
 
 impl<N: Number, const F: usize> Memory<N, F> {
-    /// Allocates nothing.
-    pub fn none() -> Self {
-        Self::with([0; 2])
-    }
-
     /// Allocates what any solver needs for systems of `n` equations.
     pub fn any(n: usize) -> Self {
         Self::with([n; 2])
+    }
+
+    /// Allocates what the solver `S` needs for them.
+    pub fn of_solver<S: Solves>(n: usize) -> Self {
+        Self::with(if S::FACTS.sweeps { [n, 0] } else { [0, n] })
     }
 
     fn with([system, factor]: [usize; 2]) -> Self {
@@ -209,12 +191,9 @@ impl Solves for Sweeps {
         refuses_because: "",
         numbers_per_node: 13,
         numbers_to_refine: 0,
-        kernel: KernelFacts { shuffles: true, rows_per_block: 3 },
+        shuffles: true,
+        rows_per_block: 3,
     };
-
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
-        Memory { system: System::zeros(n), ..Memory::none() }
-    }
 
     #[inline(always)]
     fn solve<N: Number, const F: usize>(
@@ -257,12 +236,9 @@ impl Solves for Elimination {
         refuses_because: "the direct solver makes no sweeps",
         numbers_per_node: 11,
         numbers_to_refine: 9,
-        kernel: KernelFacts { shuffles: false, rows_per_block: 6 },
+        shuffles: false,
+        rows_per_block: 6,
     };
-
-    fn memory<N: Number, const F: usize>(n: usize) -> Memory<N, F> {
-        Memory { factor: direct::Factor::new(n), ..Memory::none() }
-    }
 
     #[inline(always)]
     fn solve<N: Number, const F: usize>(

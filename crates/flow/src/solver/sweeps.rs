@@ -131,39 +131,34 @@ pub(super) fn largest<N: Number, const F: usize>(unknown: &[&mut Ring<N>; F]) ->
     largest
 }
 
-/// Sweeps once, colour by colour.
+/// Sweeps once, in the lanes that are active.
 #[inline(always)]
-pub(super) fn coloured_sweep<N: Number, const F: usize>(
+pub(super) fn sweep<N: Number, const F: usize>(
     system: &System<N, F>,
     unknown: &mut [&mut Ring<N>; F],
     blocks: Blocks,
+    order: Order,
     sor: N,
     active: N::Mask,
 ) {
     let mut relaxation = Relaxation::new(system, unknown, sor, active);
-    for colour in 0..COLOURS {
-        for (range, stride) in blocks.of_colour(colour) {
-            relaxation.relax(stride, range);
+    match order {
+        Order::Coloured => {
+            for colour in 0..COLOURS {
+                for (range, stride) in blocks.of_colour(colour) {
+                    relaxation.relax(stride, range);
+                }
+                relaxation.close();
+            }
         }
-        relaxation.close();
+        Order::Lexicographic => {
+            // Only the last two nodes read ghosts that this sweep has changed.
+            for range in [0..blocks.n - 2, blocks.n - 2..blocks.n] {
+                relaxation.relax(1, range);
+                relaxation.close();
+            }
+        }
     }
-}
-
-/// Sweeps once, node by node.
-#[inline(always)]
-pub(super) fn lexicographic_sweep<N: Number, const F: usize>(
-    system: &System<N, F>,
-    unknown: &mut [&mut Ring<N>; F],
-    sor: N,
-    active: N::Mask,
-) {
-    let n = system.rows.len();
-    let mut relaxation = Relaxation::new(system, unknown, sor, active);
-    relaxation.relax(1, 0..n - 2);
-    // Only the last two nodes read ghosts that this sweep has changed.
-    relaxation.close();
-    relaxation.relax(1, n - 2..n);
-    relaxation.close();
 }
 
 /// The data of a sweep as slices, whose addresses then stay in registers.

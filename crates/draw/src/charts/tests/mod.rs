@@ -3,13 +3,12 @@
 //! To look at the pictures: `CURVELAX_CHARTS=FOLDER cargo test charts`.
 
 mod reading;
+mod samples;
 
-use super::{
-    Setting,
-    samples::{amplitudes, decay, draw_all, pictures, survival},
-};
+use super::Setting;
 use crate::medium::Medium;
 use reading::{attribute, commands, complaint, paths, scale, texts};
+use samples::{amplitudes, decay, draw_all, pictures, survival};
 
 #[test]
 fn no_text_of_any_chart_is_cut_off_or_over_another() {

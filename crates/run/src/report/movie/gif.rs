@@ -79,9 +79,9 @@ impl Movie {
     fn still(&self) -> Option<Raster> {
         let mut picture = Raster::new(self.size.x as u32, self.size.y as u32)?;
         let words = self.head();
-        let head = DVec2::new(self.size.x - MARGIN - (words.len() * Letters::Small.advance()) as f64, 28.0);
+        let head = DVec2::new(self.size.x - MARGIN - (words.len() * Letters::SMALL.advance()) as f64, 28.0);
         if head.x > 0.5 * self.size.x || words != GREY {
-            picture.text(head, &words, INK, Letters::Small);
+            picture.text(head, &words, INK, Letters::SMALL);
         }
         for panel in &self.panels {
             let (low, high) = (panel.corner + 0.5, panel.corner + self.frame - 0.5);
@@ -98,16 +98,16 @@ impl Movie {
                 for line in [[left, right], [left - tick, left + tick], [right - tick, right + tick]] {
                     picture.line(&line, false, INK, 1.0);
                 }
-                picture.text(right + DVec2::new(8.0, 4.0), text, INK, Letters::Small);
+                picture.text(right + DVec2::new(8.0, 4.0), text, INK, Letters::SMALL);
             }
-            None => picture.text(self.foot() + tick, OWN_SCALES, INK, Letters::Small),
+            None => picture.text(self.foot() + tick, OWN_SCALES, INK, Letters::SMALL),
         }
         Some(picture)
     }
 
     /// What moves, at the time `t`.
     fn draw(&self, picture: &mut Raster, t: f64) {
-        picture.text(DVec2::new(MARGIN, 29.0), &self.clock(t), INK, Letters::Large);
+        picture.text(DVec2::new(MARGIN, 29.0), &self.clock(t), INK, Letters::LARGE);
         for panel in &self.panels {
             let (nodes, colour) = (panel.member.at(t), colour(panel.member.status));
             let (told_at, end) = &panel.end;
@@ -123,8 +123,8 @@ impl Movie {
 
     /// Writes line `i` of the words below a panel.
     fn write(&self, picture: &mut Raster, panel: &MoviePanel, i: usize, words: &str, colour: Colour) {
-        let words = Letters::Small.shortened(words, self.frame.x);
-        picture.text_in_the_middle(self.words(panel, i), &words, colour, Letters::Small);
+        let words = Letters::SMALL.shortened(words, self.frame.x);
+        picture.text_in_the_middle(self.words(panel, i), &words, colour, Letters::SMALL);
     }
 }
 

@@ -1,3 +1,6 @@
+#[path = "../../../../draw/src/charts/tests/samples.rs"]
+mod samples;
+
 use std::f64::consts::TAU;
 
 use glam::DVec2;
@@ -6,7 +9,7 @@ use base64::Engine as _;
 use sha2::{Digest, Sha256};
 
 use super::*;
-use curvelax_draw::charts::samples::pictures;
+use samples::pictures;
 
 /// A perturbed ellipse whose modes decay as in theory, recorded often at first and rarely later.
 fn member(j: usize) -> MovingMember {

@@ -71,7 +71,8 @@ fn watched<T: Evolves>(launches: &[Run<f64>], method: &Method, n: usize) -> Resu
             let side = if end[place] < start[place] { &mut low } else { &mut high };
             side[place] = level;
             launch.parameters.watched = 1.0;
-            launch.parameters.set_levels(&Observed::from_numbers(&low), &Observed::from_numbers(&high));
+            launch.parameters.low = Observed::from_numbers(&low);
+            launch.parameters.high = Observed::from_numbers(&high);
         }
         Ok(Watched { launch, level })
     };

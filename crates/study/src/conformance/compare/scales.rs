@@ -4,7 +4,7 @@ use super::setup::{method, traced_workspace};
 use crate::conformance::bounds::NaturalScale;
 use curvelax_base::error::Result;
 use curvelax_flow::{
-    scheme::{Curve, Parameters, Workspace, run::Run, step},
+    scheme::{Curve, Parameters, Workspace, run::Run, step::Steps},
     solver::Solver,
 };
 
@@ -20,7 +20,7 @@ impl Scales {
         let mut run = launch.clone();
         let mut work = traced_workspace(run.state.curve.len())?;
         let increments = &mut run.state.increments;
-        step::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
+        Steps::step(&run.state.curve, increments, &run.parameters, &method(Solver::Direct), &mut work);
         Ok(Scales { curve: run.state.curve, parameters: run.parameters, work })
     }
 

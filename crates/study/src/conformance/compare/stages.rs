@@ -14,7 +14,7 @@ use curvelax_backend::gpu::{Variant, shader::TRACE_FIELDS};
 use curvelax_base::error::Result;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::{
-    scheme::{Increments, Workspace, run::Run, step},
+    scheme::{Increments, Workspace, run::Run, step::Steps},
     solver::{Ring, Solver},
 };
 use curvelax_gpu as gpu;
@@ -48,7 +48,7 @@ pub fn stages<T: Evolves>(
         let mut run: Run<T> = launch.convert();
         let mut work = traced_workspace(n)?;
         let Run { state, parameters, .. } = &mut run;
-        step::step(&state.curve, &mut state.increments, parameters, &method(solver), &mut work);
+        Steps::step(&state.curve, &mut state.increments, parameters, &method(solver), &mut work);
         let twin = traced(&work, &run.state.increments);
         let scales = Scales::of(launch)?;
         for (field, (row, bound)) in rows.iter_mut().zip(&STAGES).enumerate() {

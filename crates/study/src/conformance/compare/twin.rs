@@ -4,7 +4,7 @@ use super::{device::Left, setup::blocks};
 use curvelax_base::error::Result;
 use curvelax_ensemble::schedule::Ticks;
 use curvelax_flow::scheme::{
-    evolve::{Evolves, Team, evolve},
+    evolve::{Evolves, Team},
     extrapolation::LEAST_ORDER,
     pace,
     run::Run,
@@ -40,7 +40,7 @@ pub(super) fn twin<T: Evolves>(launch: &Run<f64>, method: &Method, n: usize) -> 
         let before = run.report.now.excess.to_f64();
         let (own_order, is_aimed) = (run.counters.order, pace::is_aimed(&run.report.progress));
         order = order.max(own_order);
-        evolve(&mut run, method, &mut work, 1);
+        Evolves::evolve(&mut run, method, &mut work, 1);
         steepest = steepest.max((run.report.now.excess.to_f64() - before).abs());
         longest = longest.max(run.report.progress.taken.to_f64());
         product = leverage * run.report.progress.taken.to_f64();
@@ -67,14 +67,14 @@ pub(super) fn without_ties<T: Evolves>(mut launch: Run<f64>, method: &Method, n:
         let mut run: Run<T> = launch.convert();
         let mut tied = false;
         // The first length is given.
-        evolve(&mut run, method, &mut work, 1);
+        Evolves::evolve(&mut run, method, &mut work, 1);
         while run.counters.is_running() && !tied {
             let (p, progress) = (&run.parameters, &run.report.progress);
             let left = (p.end_high - progress.time_high) + (p.end_low - progress.time_low);
             let [of_left, aim] = [progress.next / left, progress.aim / progress.next].map(T::to_f64);
             let decisions = [(of_left, 1.0), (of_left, 0.5), (aim, 1.0), (aim, pace::NEAREST_AIM)];
             tied = decisions.into_iter().any(|(length, bound)| (length / bound - 1.0).abs() < TIE);
-            evolve(&mut run, method, &mut work, 1);
+            Evolves::evolve(&mut run, method, &mut work, 1);
         }
         if !tied {
             return Ok(launch);

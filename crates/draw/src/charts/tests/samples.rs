@@ -1,9 +1,10 @@
-//! Pictures of every kind of data, to test and to look at.
+//! Pictures of every kind of data, to test and to look at. Tests of crates above have this file as a module, too.
+#![allow(dead_code)] // every test uses a different part of it
 
 use std::sync::OnceLock;
 
-use crate::{charts::*, medium::Medium};
 use curvelax_base::interval::Interval;
+use curvelax_draw::{charts::*, medium::Medium};
 
 /// Numbers in (0, 1), equal on every machine: Halton numbers of base 2 or 3.
 fn spread(i: usize, base: usize) -> f64 {
