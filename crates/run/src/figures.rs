@@ -118,11 +118,6 @@ pub const FIGURES: [Figure; 4] = [
 ];
 
 impl Figure {
-    /// Returns the figure called `name`.
-    pub fn find(name: &str) -> Option<&'static Figure> {
-        FIGURES.iter().find(|figure| figure.name == name)
-    }
-
     /// The run that makes the figure: one unperturbed member on the CPU, in f64 and solved directly, so that all
     /// machines with the same mathematical library give the same bits.
     pub fn spec(&self) -> Result<Spec> {
@@ -232,9 +227,7 @@ mod tests {
             assert_eq!(spec.snapshots, figure.times);
             assert_eq!((spec.backend, spec.precision), (BackendChoice::Cpu, Some(Precision::F64)));
             assert!(FIGURES[..i].iter().all(|other| other.name != figure.name));
-            assert_eq!(Figure::find(figure.name), Some(figure));
         }
-        assert_eq!(Figure::find("fig3"), None);
     }
 
     #[test]
@@ -244,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_curve_that_fails_makes_no_figure() {
-        let figure = Figure::find("fig1a").unwrap();
+        let figure = &FIGURES[0];
         // Steps so long that the first merges nodes.
         let spec = Spec { shape: "nonconvex".parse().unwrap(), tau: Some(0.05.into()), ..figure.spec().unwrap() };
         let error = figure.simulate(&spec, Progress::Quiet).unwrap_err();

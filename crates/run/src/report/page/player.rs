@@ -85,6 +85,8 @@ impl Player {
     pub fn new(trajectories: &[MovingMember], units: &[String; 2]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
+        let bounds =
+            |frames: &[(f64, Vec<DVec2>)]| polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes).copied());
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
         if boxes.is_empty() {
             return None;
@@ -190,10 +192,6 @@ impl Player {
 pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let shown = count.min(most);
     (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
-}
-
-fn bounds(frames: &[(f64, Vec<DVec2>)]) -> Option<(DVec2, DVec2)> {
-    polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes.iter().copied()))
 }
 
 fn path(frame: &[u16]) -> String {
