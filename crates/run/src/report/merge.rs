@@ -137,11 +137,8 @@ impl Shards {
     fn all_but(&self, others: impl Iterator<Item = u64>) -> Vec<RangeInclusive<u64>> {
         match &self.spec.only {
             Some(only) => {
-                let mut own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
-                for index in others {
-                    own.remove(&index);
-                }
-                let own: Vec<u64> = own.into_iter().collect();
+                let own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
+                let own: Vec<u64> = own.difference(&others.collect()).copied().collect();
                 own.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..=run[run.len() - 1]).collect()
             }
             None => {

@@ -81,15 +81,15 @@ impl FinishedRun<'_> {
         });
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
-        let text = self.text(medium, "Relaxation times", &self.error(), key);
-        let (title, quantity) = (text.title.clone(), self.statistics.time());
+        let (title, quantity) = ("Relaxation times", self.statistics.time());
+        let text = self.text(medium, title, &self.error(), key);
         let svg = RelaxationTimes { text, cells: times.collect(), others: &others, median }.draw(medium);
         let of_cells = if self.statistics.cells.len() > 1 { " of each cell" } else { "" };
         let caption = format!(
             "Above: how many members{of_cells} relaxed at which {quantity}. Below: the share of them that had relaxed by \
              then."
         );
-        figure(names::RELAXATION, &title, &caption, svg)
+        figure(names::RELAXATION, title, &caption, svg)
     }
 
     /// The times of each cell as a box, and their quantiles against those of two laws.
