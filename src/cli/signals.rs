@@ -25,6 +25,11 @@ const SHORT_PATIENCE: Duration = Duration::from_millis(1000);
 /// Time for the reader of stderr to accept the last message.
 const LAST_WORD: Duration = Duration::from_millis(100);
 
+/// Receives signals and forwards those that ask for the end, until closed.
+type SignalListener = Box<dyn FnOnce(&mut dyn FnMut(Cause)) + Send>;
+/// Ends the reception.
+type ListenerHandle = Box<dyn FnOnce() + Send>;
+
 /// From now on, forwards requests to end this process to `stop`; also when the time `most` is over.
 ///
 /// # Errors
@@ -101,8 +106,7 @@ mod system {
     use super::*;
     use crate::Error;
 
-    /// What receives signals and forwards those that ask for the end, until it is closed, and what closes it.
-    pub fn listener() -> Result<(impl FnOnce(&mut dyn FnMut(Cause)) + Send, impl FnOnce() + Send)> {
+    pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
         let ignored = ignored();
         let received = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
         let mut signals = Signals::new(received).map_err(|e| {
@@ -120,7 +124,7 @@ mod system {
                 });
             }
         };
-        Ok((forward, move || closing.close()))
+        Ok((Box::new(forward), Box::new(move || closing.close())))
     }
 
     /// The signals that the parent process wants ignored, as with `nohup`: bit i - 1 for signal i. Available on Linux
@@ -147,7 +151,7 @@ mod system {
 mod system {
     use super::*;
 
-    pub fn listener() -> Result<(impl FnOnce(&mut dyn FnMut(Cause)) + Send, impl FnOnce() + Send)> {
+    pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
         let (closing, closed) = channel::<()>();
         let forward = move |_: &mut dyn FnMut(Cause)| {
             let _ = closed.recv();
@@ -155,7 +159,7 @@ mod system {
         let close = move || {
             let _ = closing.send(());
         };
-        Ok((forward, close))
+        Ok((Box::new(forward), Box::new(close)))
     }
 
     pub fn outlive_full_files() {}

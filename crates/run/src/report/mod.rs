@@ -63,8 +63,11 @@ pub struct ReportOptions {
     pub patience: Duration,
     /// Sees the snapshots of members, in time order and before they are stored. Those that a resumed run has stored
     /// earlier are not seen again.
-    pub see: Box<dyn FnMut(&[Snapshot])>,
+    pub see: SnapshotWatch,
 }
+
+/// Someone who looks at snapshots.
+pub type SnapshotWatch = Box<dyn FnMut(&[Snapshot])>;
 
 /// Everything written about a run.
 // The tables come before the folder: dropped first, they leave it empty for its clean-up.
