@@ -107,8 +107,8 @@ impl Progress {
     }
 }
 
-/// Whether a line is due `elapsed` after the start of the run, if so many periods had passed at the last look. Lines are
-/// at even times; a run that ends before the first has none.
+/// Whether a line is due `elapsed` after the start of the run, if so many `periods` had passed at the last look. Lines
+/// are at even times; a run that ends before the first has none.
 fn is_due(periods: &mut u64, elapsed: Duration) -> bool {
     let now = elapsed.as_secs() / PERIOD.as_secs();
     std::mem::replace(periods, now) < now
