@@ -48,14 +48,16 @@ pub fn spec(points: usize, spec: Spec) -> Result<Spec> {
 /// A running back end with full slots.
 pub struct Bench {
     backend: Box<dyn Backend>,
-    platform: Platform,
+    /// Where it runs.
+    pub platform: Platform,
     members: Vec<Run<f64>>,
     threads: HostThreads,
     /// Curve-steps of each slot since its member was loaded.
     made: Vec<u64>,
     /// Steps from one aim to the next; [`u32::MAX`] if the back end pauses earlier by itself.
     stride: u32,
-    start_up: Duration,
+    /// Time from opening to the end of the first step, including the compilation of kernels.
+    pub start_up: Duration,
 }
 
 /// The work done in a time.
@@ -103,19 +105,9 @@ impl Bench {
         Ok(bench)
     }
 
-    /// Where it runs.
-    pub fn platform(&self) -> &Platform {
-        &self.platform
-    }
-
     /// Number of members running side by side.
     pub fn curves(&self) -> usize {
         self.made.len()
-    }
-
-    /// Time from opening to the end of the first step, including the compilation of kernels.
-    pub fn start_up(&self) -> Duration {
-        self.start_up
     }
 
     /// Advances for at least `window`.

@@ -25,7 +25,6 @@ const EVERY: Duration = Duration::from_secs(5);
 /// The functions that are called during a run.
 pub struct Notebook {
     shared: Arc<Shared>,
-    seen: Mutex<SnapshotBuffer>,
     /// When Python was last asked whether to continue.
     asked: Mutex<Option<Instant>>,
 }
@@ -34,6 +33,7 @@ struct Shared {
     progress: Py<PyAny>,
     say: Py<PyAny>,
     stop: Stop,
+    seen: Mutex<SnapshotBuffer>,
     /// What was raised in Python during the run.
     raised: Mutex<Option<PyErr>>,
 }
@@ -57,8 +57,8 @@ impl Shared {
 impl Notebook {
     /// Tells `progress` and `say`.
     pub fn new(progress: Py<PyAny>, say: Py<PyAny>) -> Notebook {
-        let shared = Shared { progress, say, stop: Stop::default(), raised: Mutex::default() };
-        Notebook { shared: shared.into(), seen: Mutex::default(), asked: Mutex::default() }
+        let shared = Shared { progress, say, stop: Stop::default(), seen: Mutex::default(), raised: Mutex::default() };
+        Notebook { shared: shared.into(), asked: Mutex::default() }
     }
 
     /// Moves out what was raised in Python.
@@ -76,7 +76,7 @@ impl Notebook {
 
     /// Moves out the snapshots.
     pub fn seen(&self) -> SnapshotBuffer {
-        std::mem::take(&mut *lock(&self.seen))
+        std::mem::take(&mut *lock(&self.shared.seen))
     }
 }
 
@@ -94,7 +94,7 @@ impl Host for Notebook {
     }
 
     fn options_with(&self, stop: Stop) -> ReportOptions {
-        let (shared, mut last) = (self.shared.clone(), None::<Instant>);
+        let (shared, seeing, mut last) = (self.shared.clone(), self.shared.clone(), None::<Instant>);
         let told = move |done: u64, total: u64, share: f64| {
             if last.is_none_or(|last| last.elapsed() >= PERIOD) {
                 last = Some(Instant::now());
@@ -107,6 +107,7 @@ impl Host for Notebook {
             every: EVERY,
             stop,
             patience: PATIENCE,
+            see: Box::new(move |snapshots: &[Snapshot]| lock(&seeing.seen).add(snapshots)),
         }
     }
 
@@ -120,9 +121,5 @@ impl Host for Notebook {
             Some((cause, _)) => Err(cause.error(" before the run began: nothing is saved")),
             None => Ok(()),
         }
-    }
-
-    fn see(&self, snapshots: &[Snapshot]) {
-        lock(&self.seen).add(snapshots);
     }
 }

@@ -47,11 +47,14 @@ fn unforked(py: Python<'_>) -> PyResult<()> {
 
 #[pymodule]
 mod _curvelax {
-    use std::{ffi::OsString, path::PathBuf};
+    use std::{
+        ffi::OsString,
+        path::{Path, PathBuf},
+    };
 
     use curvelax::{
         files::{Existing, OutputFolder, names},
-        session::{self, Completed, Host, PlacedStudy, ResumePlace, RunPlan},
+        session::{self, Completed, Host, PlacedStudy, ResumePlace},
     };
     use pyo3::{
         prelude::*,
@@ -108,20 +111,20 @@ mod _curvelax {
             let spec = keys.spec()?;
             let options = host.options()?;
             OutputFolder::check_place(&out, existing)?;
-            let placed = PlacedStudy::of(RunPlan::new(spec, Some(&options), &host)?)?;
+            let placed = PlacedStudy::plan(spec, Some(&options), &host)?;
             placed.study.note().into_iter().for_each(|note| host.say(&format!("note: {note}")));
             session::begin(placed, &out, existing, options, &host)
         });
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
-        tell_verdict(&host, &completed);
+        tell_verdict(&host, &completed, &out);
         host.check_calls(py)?;
         Ok((completed.text, host.seen()))
     }
 
     /// Warns if a run does not hold what was asked for, where the program has exit code 3: its results are there to
     /// look at.
-    fn tell_verdict(host: &Notebook, completed: &Completed) {
-        if let Err(error) = completed.verdict.check(false, &completed.out.join(names::SUMMARY)) {
+    fn tell_verdict(host: &Notebook, completed: &Completed, out: &Path) {
+        if let Err(error) = completed.verdict.check(false, &out.join(names::SUMMARY)) {
             host.say(&format!("warning: {error}"));
         }
     }
@@ -133,7 +136,7 @@ mod _curvelax {
         let host = Notebook::new(progress, say);
         let done = py.detach(|| session::resume(&out, ResumePlace::default(), &host));
         let completed = done.map_err(|error| raise(py, error, host.raised()))?;
-        completed.iter().for_each(|completed| tell_verdict(&host, completed));
+        completed.iter().for_each(|completed| tell_verdict(&host, completed, &out));
         host.check_calls(py)?;
         Ok(completed.map(|completed| completed.text))
     }

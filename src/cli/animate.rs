@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::print;
+use super::{check_range, print};
 use crate::{
     error::{Error, Result},
     files::{OutputFolder, Owner, names, reader},
@@ -95,12 +95,12 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
     let Some(movie) = Movie::new(&films, spec, &cut, limit) else {
         return cannot("no member has a state that can be drawn; see `status` in summary.csv");
     };
-    let file = MovieFile::open(&path, args.out.is_none() || args.force)?;
+    let (folder, name) = open(&path, args.out.is_none() || args.force)?;
     let (content, frames) = match format {
         MovieFormat::Gif => movie.gif().map(|(bytes, frames)| (bytes, format!("{frames} frames, ")))?,
         MovieFormat::Svg => (movie.svg().into_bytes(), String::new()),
     };
-    file.write(&content)?;
+    folder.publish_all(vec![folder.write(&name, &content)?])?;
     if args.quiet {
         return Ok(());
     }
@@ -112,47 +112,25 @@ pub fn animate(args: AnimateArgs) -> Result<()> {
 /// Checks the numbers.
 fn cut(args: &AnimateArgs) -> Result<MovieOptions> {
     let AnimateArgs { seconds, width, members, .. } = *args;
-    let [least, most] = MAX_SECONDS;
-    if !(least..=most).contains(&seconds) {
-        return Err(Error::value("seconds", seconds, "out of range", &format!("use {least} to {most}")));
-    }
-    let [least, most] = WIDTHS;
-    if !(least..=most).contains(&width) {
-        return Err(Error::value("width", width, "out of range", &format!("use {least} to {most} pixels")));
-    }
-    if !(1..=MAX_PANELS).contains(&members) {
-        return Err(Error::value("members", members, "out of range", &format!("use 1 to {MAX_PANELS}")));
-    }
+    check_range("seconds", seconds, MAX_SECONDS, "")?;
+    check_range("width", width, WIDTHS, " pixels")?;
+    check_range("members", members, [1, MAX_PANELS], "")?;
     Ok(MovieOptions { seconds, width, members })
 }
 
-/// The file of the movie, in its open folder.
-struct MovieFile {
-    folder: OutputFolder,
-    name: String,
-}
-
-impl MovieFile {
-    /// Opens the folder of `path`, and makes it if there is none. An existing file is refused, unless it may be
-    /// `replaced`.
-    fn open(path: &Path, replaced: bool) -> Result<MovieFile> {
-        let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
-            return Err(Error::value("out", path.display(), "not a name of a file in UTF-8", "use another name"));
-        };
-        if !replaced && path.symlink_metadata().is_ok() {
-            let remedy = "name another file, or add --force to replace it";
-            return Err(Error::value("out", path.display(), "already exists", remedy));
-        }
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
-        let folder = OutputFolder::open_for(folder, true, Owner::Movie, vec![name.into()])?;
-        Ok(MovieFile { folder, name: name.into() })
+/// Opens the folder of `path`, and makes it if there is none; returns it and the name of the file. An existing file is
+/// refused, unless it may be `replaced`.
+fn open(path: &Path, replaced: bool) -> Result<(OutputFolder, String)> {
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else {
+        return Err(Error::value("out", path.display(), "not a name of a file in UTF-8", "use another name"));
+    };
+    if !replaced && path.symlink_metadata().is_ok() {
+        let remedy = "name another file, or add --force to replace it";
+        return Err(Error::value("out", path.display(), "already exists", remedy));
     }
-
-    fn write(&self, content: &[u8]) -> Result<()> {
-        let file = self.folder.write(&self.name, content)?;
-        self.folder.publish_all(vec![file])
-    }
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    Ok((OutputFolder::open_for(folder, true, Owner::Movie, vec![name.into()])?, name.into()))
 }

@@ -4,7 +4,7 @@ use std::{collections::HashSet, time::Duration};
 
 use serde::Serialize;
 
-use super::{flags, note, parsers, print, print_json};
+use super::{check_range, flags, note, parsers, print, print_json};
 use crate::{
     backend::{DeviceKind, gpu::Gpu},
     bench::{self, Bench, BenchSample},
@@ -126,9 +126,7 @@ pub fn bench(args: BenchArgs) -> Result<()> {
     if !(seconds > 0.0 && seconds <= MAX_SECONDS) {
         return Err(Error::value("seconds", seconds, "out of range", &format!("use up to {MAX_SECONDS}")));
     }
-    if !(1..=MAX_REPEATS).contains(&repeats) {
-        return Err(Error::value("repeats", repeats, "out of range", &format!("use 1 to {MAX_REPEATS}")));
-    }
+    check_range("repeats", repeats, [1, MAX_REPEATS], "")?;
     let window = Duration::from_secs_f64(seconds / repeats as f64);
     let mut cases = cases(&args)?.into_iter().map(Case::new).collect::<Vec<_>>();
     for case in &mut cases {
@@ -171,13 +169,12 @@ fn cases(args: &BenchArgs) -> Result<Vec<(DeviceKind, Spec)>> {
     let suits = |solver: &Solver| args.adaptive.is_none() || !solver.sweeps();
     let solvers = or(&args.solver, &Solver::ALL.into_iter().rev().filter(suits).collect::<Vec<_>>());
     let mut cases = Vec::new();
-    for place in places(args)? {
+    for (backend, place) in places(args, &base)? {
         for points in or(&args.points, &[base.points]) {
             for &solver in &solvers {
                 for precision in or(&args.precision, &[Precision::F64, Precision::F32]) {
-                    let solver = solver.into();
-                    let spec = Spec { solver, precision: Some(precision), ..place.clone().over(&base) };
-                    cases.push((place.backend, bench::spec(points, spec)?));
+                    let spec = Spec { solver: solver.into(), precision: Some(precision), ..place.clone() };
+                    cases.push((backend, bench::spec(points, spec)?));
                 }
             }
         }
@@ -185,27 +182,17 @@ fn cases(args: &BenchArgs) -> Result<Vec<(DeviceKind, Spec)>> {
     Ok(cases)
 }
 
-/// Where a case runs: the CPU, or the adapter of this name; and with how many members.
-#[derive(Clone)]
-struct BenchPlace {
-    backend: DeviceKind,
-    adapter: Option<String>,
-    curves: u64,
-}
-
-impl BenchPlace {
-    fn over(self, base: &Spec) -> Spec {
-        Spec { backend: self.backend.into(), adapter: self.adapter, curves: self.curves, ..base.clone() }
-    }
-}
-
-/// The requested back ends. An adapter listed by several interfaces is measured once, through the first.
-fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
+/// The requested back ends, each with what `base` is there: the adapter, and how many members. An adapter listed by
+/// several interfaces is measured once, through the first.
+fn places(args: &BenchArgs, base: &Spec) -> Result<Vec<(DeviceKind, Spec)>> {
+    let place = |backend: DeviceKind, adapter: Option<String>, enough: u64| {
+        let curves = args.curves.unwrap_or(enough);
+        (backend, Spec { backend: backend.into(), adapter, curves, ..base.clone() })
+    };
     let asked = |backend| args.backend.contains(&backend);
     let mut places = Vec::new();
     if asked(DeviceKind::Cpu) || (args.backend.is_empty() && args.adapter.is_none()) {
-        let curves = args.curves.unwrap_or(CURVES);
-        places.push(BenchPlace { backend: DeviceKind::Cpu, adapter: None, curves });
+        places.push(place(DeviceKind::Cpu, None, CURVES));
     }
     if !args.backend.is_empty() && !asked(DeviceKind::Gpu) {
         return match &args.adapter {
@@ -222,8 +209,7 @@ fn places(args: &BenchArgs) -> Result<Vec<BenchPlace>> {
             let enough = if gpu.is_hardware() { CURVES } else { CURVES_IN_SOFTWARE };
             // If two adapters share a name, the name would mean the first.
             let adapter = args.adapter.clone().filter(|_| by_number).or_else(|| Some(gpu.name().to_string()));
-            let curves = args.curves.unwrap_or(enough);
-            places.push(BenchPlace { backend: DeviceKind::Gpu, adapter, curves });
+            places.push(place(DeviceKind::Gpu, adapter, enough));
         }
     }
     if seen.is_empty() && (args.adapter.is_some() || asked(DeviceKind::Gpu)) {
@@ -268,17 +254,17 @@ impl Case {
 
     fn row(&self) -> BenchRow {
         let bench = self.bench.as_ref().ok();
-        let platform = bench.map(Bench::platform);
+        let platform = bench.map(|bench| &bench.platform);
         let steps: u64 = self.samples.iter().map(|sample| sample.steps).sum();
         let sweeps: u64 = self.samples.iter().map(|sample| sample.sweeps).sum();
         let rates: Vec<f64> =
             self.samples.iter().map(|sample| sample.steps as f64 / sample.elapsed.as_secs_f64()).collect();
-        let spread = bench.and_then(|_| StepRates::of(rates));
         let failed = match &self.bench {
             Err(error) => Some(error.to_string()),
             Ok(_) if steps == 0 => Some("no step was finished in this time; use more --seconds".into()),
             Ok(_) => None,
         };
+        let rates = StepRates::of(rates).filter(|_| failed.is_none());
         BenchRow {
             backend: self.backend,
             adapter: self.spec.adapter.clone(),
@@ -290,14 +276,11 @@ impl Case {
             points: self.spec.points,
             adaptive: self.spec.adaptive,
             curves: bench.map(Bench::curves),
-            start_up_seconds: bench.map(|bench| bench.start_up().as_secs_f64()),
+            start_up_seconds: bench.map(|bench| bench.start_up.as_secs_f64()),
             curve_steps: steps,
             sweeps_per_step: (failed.is_none() && sweeps > 0).then(|| sweeps as f64 / steps as f64),
-            nanoseconds_per_node: (failed.is_none())
-                .then_some(spread.as_ref())
-                .flatten()
-                .map(|spread| 1e9 / (spread.median * self.spec.points as f64)),
-            steps_per_second: spread.filter(|_| failed.is_none()),
+            nanoseconds_per_node: rates.as_ref().map(|rates| 1e9 / (rates.median * self.spec.points as f64)),
+            steps_per_second: rates,
             failed,
         }
     }

@@ -31,40 +31,40 @@ const STEPS: [u32; 2] = [1, 100];
 /// The work of a kernel per dispatch.
 const BUDGET: Budget = Budget { steps: 16, sweeps: u32::MAX };
 
-/// Comparisons with a separate kernel each.
-#[derive(Clone, Copy)]
-enum Compared {
-    /// The stages of a step.
-    Stages,
-    /// Whole runs in fixed steps.
-    Fixed,
-    /// Whole runs in adaptive steps.
-    Adaptive,
-    /// Events in fixed steps.
-    Events,
-    /// Events in adaptive steps.
-    AdaptiveEvents,
-}
+/// A comparison with a separate kernel: its name, and the rows for a solver and a number of nodes.
+type Compared = (&'static str, fn(&Gpu, Solver, usize) -> Result<Vec<ConformanceRow>>);
 
-impl Compared {
-    /// For every number of nodes.
-    const SIZED: [Compared; 3] = [Compared::Stages, Compared::Fixed, Compared::Adaptive];
-    /// For one.
-    const ONCE: [Compared; 2] = [Compared::Events, Compared::AdaptiveEvents];
-
-    fn name(self) -> &'static str {
-        match self {
-            Compared::Stages => "stages of a step",
-            Compared::Fixed => "fixed steps",
-            Compared::Adaptive => "adaptive steps",
-            Compared::Events => "events",
-            Compared::AdaptiveEvents => "events, adaptive steps",
-        }
-    }
-}
-
+/// Comparisons for every number of nodes, and for one.
+const SIZED: usize = 3;
+const ONCE: usize = 2;
 /// Kernels that are compiled and compared for each adapter and precision.
-const KERNELS: usize = Solver::ALL.len() * (SIZES.len() * Compared::SIZED.len() + Compared::ONCE.len());
+const KERNELS: usize = Solver::ALL.len() * (SIZES.len() * SIZED + ONCE);
+
+/// The stages of a step, for solvers after the first without those before a solve; and whole runs.
+fn sized<T: Evolves>() -> [Compared; SIZED] {
+    [
+        ("stages of a step", |gpu, solver, n| {
+            let mut rows = stages::<T>(Driven::Paper, gpu, solver, n, |_| ())?;
+            rows.retain(|row| solver == Solver::ALL[0] || row.quantity.starts_with('δ'));
+            Ok(rows)
+        }),
+        ("fixed steps", |gpu, solver, n| {
+            let mut rows = Vec::new();
+            for steps in STEPS {
+                rows.extend(runs::<T>(Driven::Paper, gpu, solver, n, Some(steps), BUDGET, |_| ())?);
+            }
+            Ok(rows)
+        }),
+        ("adaptive steps", |gpu, solver, n| runs::<T>(Driven::Paper, gpu, solver, n, None, BUDGET, |_| ())),
+    ]
+}
+
+fn once<T: Evolves>() -> [Compared; ONCE] {
+    [
+        ("events", |gpu, solver, n| Ok(vec![events::<T>(gpu, solver, n, false, BUDGET, |_| ())?])),
+        ("events, adaptive steps", |gpu, solver, n| Ok(vec![events::<T>(gpu, solver, n, true, BUDGET, |_| ())?])),
+    ]
+}
 
 /// Compare the GPU with the CPU on this machine's adapters, as a table; exit code 1 on failure.
 #[derive(clap::Args)]
@@ -147,8 +147,8 @@ pub fn check(args: CheckArgs) -> Result<()> {
 fn compare(gpu: &Gpu, mut progress: Progress) -> Result<Vec<ConformanceRow>> {
     let total = if gpu.has_f64() { 2 * KERNELS } else { KERNELS };
     let mut done = 0;
-    let mut tell = |precision: &str, solver: Solver, n: usize, kind: Compared| {
-        progress.step(done, total, &format!("{precision}, {}, n = {n}, {}", solver.name(), kind.name()));
+    let mut tell = |precision: &str, solver: Solver, n: usize, kind: &str| {
+        progress.step(done, total, &format!("{precision}, {}, n = {n}, {kind}", solver.name()));
         done += 1;
     };
     let mut rows = compare_in::<f32>(gpu, &mut tell)?;
@@ -159,20 +159,16 @@ fn compare(gpu: &Gpu, mut progress: Progress) -> Result<Vec<ConformanceRow>> {
     Ok(rows)
 }
 
-/// The worst row of every quantity over all sizes; for solvers after the first, without stages before a solve. Every
-/// kernel is announced before it is compiled.
-fn compare_in<T: Evolves>(
-    gpu: &Gpu,
-    tell: &mut impl FnMut(&str, Solver, usize, Compared),
-) -> Result<Vec<ConformanceRow>> {
+/// The worst row of every quantity over all sizes. Every kernel is announced before it is compiled.
+fn compare_in<T: Evolves>(gpu: &Gpu, tell: &mut impl FnMut(&str, Solver, usize, &str)) -> Result<Vec<ConformanceRow>> {
     let mut all = Vec::new();
     for solver in Solver::ALL {
         let mut worst: Vec<ConformanceRow> = Vec::new();
         for n in SIZES {
             let mut rows = Vec::new();
-            for kind in Compared::SIZED {
+            for (kind, compared) in sized::<T>() {
                 tell(T::NAME, solver, n, kind);
-                rows.extend(compare_kernel::<T>(gpu, solver, n, kind)?);
+                rows.extend(compared(gpu, solver, n)?);
             }
             match worst.is_empty() {
                 true => worst = rows,
@@ -184,33 +180,12 @@ fn compare_in<T: Evolves>(
             }
         }
         all.extend(worst);
-        for kind in Compared::ONCE {
+        for (kind, compared) in once::<T>() {
             tell(T::NAME, solver, EVENTS_SIZE, kind);
-            all.extend(compare_kernel::<T>(gpu, solver, EVENTS_SIZE, kind)?);
+            all.extend(compared(gpu, solver, EVENTS_SIZE)?);
         }
     }
     Ok(all)
-}
-
-fn compare_kernel<T: Evolves>(gpu: &Gpu, solver: Solver, n: usize, kind: Compared) -> Result<Vec<ConformanceRow>> {
-    let mut rows = Vec::new();
-    match kind {
-        Compared::Stages => {
-            rows = stages::<T>(Driven::Paper, gpu, solver, n, |_| ())?;
-            rows.retain(|row| solver == Solver::ALL[0] || row.quantity.starts_with('δ'));
-        }
-        Compared::Fixed => {
-            for steps in STEPS {
-                rows.extend(runs::<T>(Driven::Paper, gpu, solver, n, Some(steps), BUDGET, |_| ())?);
-            }
-        }
-        Compared::Adaptive => rows = runs::<T>(Driven::Paper, gpu, solver, n, None, BUDGET, |_| ())?,
-        Compared::Events | Compared::AdaptiveEvents => {
-            let adaptive = matches!(kind, Compared::AdaptiveEvents);
-            rows.push(events::<T>(gpu, solver, n, adaptive, BUDGET, |_| ())?);
-        }
-    }
-    Ok(rows)
 }
 
 fn table(gpu: &Gpu, rows: &[ConformanceRow]) -> String {

@@ -1,6 +1,6 @@
 //! `curvelax convergence`: the error of the scheme against exact solutions, and its order.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::{
     flags, note,
@@ -110,9 +110,10 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         precision: args.precision,
         ..Spec::default()
     };
-    let (refereed, one) = (args.referee.is_given(), args.referee.is_one());
+    let (refereed, one) = (args.referee.referee, args.referee.curves.is_none());
     let spec = if refereed { args.referee.spec(spec) } else { spec };
-    let mut method = if refereed { checked(spec)? } else { spec.validate()? };
+    // The times of the referee follow its curves as they are made.
+    let mut method = if refereed { Study::new(spec)?.spec().clone() } else { spec.validate()? };
     let choice = placement::choose(&method)?;
     // Chosen once: adapters are looked for only now, and all runs have the same precision.
     choice.settle_place(&mut method);
@@ -122,7 +123,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         (_, true) => vec![names::REFEREE.into()],
         _ => vec![names::CONVERGENCE.into()],
     };
-    let folder = args.out.map(|out| open(&out, args.force, names)).transpose()?;
+    let folder = args.out.map(|out| OutputFolder::open_for(&out, args.force, Owner::Convergence, names)).transpose()?;
     if !args.quiet {
         note(&if args.work_precision { choice.place() } else { choice.sentence(&method) });
         choice.warning().iter().for_each(|warning| note(&format!("warning: {warning}")));
@@ -162,16 +163,6 @@ const WORK_TITLE: &str = "What an error of the relaxation time costs";
 /// The file of the picture with this extension.
 fn work_picture(extension: &str) -> String {
     names::WORK_PICTURE.replace("svg", extension)
-}
-
-/// Checks a spec whose times follow its curves as they are made.
-fn checked(spec: Spec) -> Result<Spec> {
-    let study = Study::new(spec)?;
-    Ok(study.spec().clone())
-}
-
-fn open(out: &Path, force: bool, names: Vec<String>) -> Result<OutputFolder> {
-    OutputFolder::open_for(out, force, Owner::Convergence, names)
 }
 
 /// Measures what errors cost, with all `solvers`; prints the rows as they come.

@@ -19,7 +19,7 @@ pub fn dry_run(placed: PlacedStudy, stop: &Stop, host: &ReportFlags) -> Result<(
     placed.warnings().iter().for_each(|warning| host.say(&format!("warning: {warning}")));
     let PlacedStudy { study, choices, .. } = placed;
     let stopped = || Some(stop.asked()?.0.error(" in the pilot: nothing is saved"));
-    let estimate = Estimate::new(&study, choices, host.checkpoint_every(), &stopped)?;
+    let estimate = Estimate::new(&study, choices, host.checkpoint_every, &stopped)?;
     match (host.json, host.quiet) {
         (true, _) => print_json(&estimate),
         (false, false) => print(&table(&estimate, &study.cells()[0].spec)),

@@ -75,7 +75,7 @@ pub fn merge(args: MergeArgs) -> Result<()> {
 
 /// Which shards are missing, and how to submit them.
 fn missing(shards: &Shards, script: &Path) -> String {
-    let (missing, count) = (shards.missing(), shards.count());
+    let (missing, count) = (shards.missing(), shards.count);
     if missing.is_empty() {
         return format!("all {count} {} are present\n", plural(count, "shard"));
     }

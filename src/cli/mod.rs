@@ -26,6 +26,7 @@ mod unknown;
 
 use std::{
     ffi::OsString,
+    fmt::Display,
     io::{self, Write},
     path::Path,
 };
@@ -113,6 +114,17 @@ fn parse(arguments: impl IntoIterator<Item = impl Into<OsString>>) -> Result<Cli
         unknown::shorten(&mut error);
         error
     })
+}
+
+/// Checks the number of a flag, of which messages name the `unit`.
+///
+/// # Errors
+/// [`Error::Request`] for a number out of range.
+fn check_range<T: PartialOrd + Display>(key: &str, value: T, [least, most]: [T; 2], unit: &str) -> Result<()> {
+    match (&least..=&most).contains(&&value) {
+        true => Ok(()),
+        false => Err(Error::value(key, value, "out of range", &format!("use {least} to {most}{unit}"))),
+    }
 }
 
 /// Writes `text` to stdout; a closed stdout is not an error.

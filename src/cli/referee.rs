@@ -19,11 +19,11 @@ use crate::{
 pub struct RefereeFlags {
     /// Instead, compare relaxation times with those of an independent spectral solver, for a smooth shape
     #[arg(long, conflicts_with_all = ["problem", "work_precision"], help_heading = REFEREE)]
-    referee: bool,
+    pub referee: bool,
     /// Compare the limits of so many members of an ensemble, as `curvelax run --accurate` makes them, instead of one
     /// curve at several n
     #[arg(long, value_name = "COUNT", value_parser = parsers::whole::<u64>, requires = "referee", help_heading = REFEREE)]
-    curves: Option<u64>,
+    pub curves: Option<u64>,
     /// Only these members [default: all]
     #[arg(long, value_name = "J1,J2,...", value_delimiter = ',', value_parser = parsers::whole::<u64>, requires = "curves", help_heading = REFEREE)]
     only: Option<Vec<u64>>,
@@ -68,16 +68,6 @@ pub struct RefereeFlags {
 const REFEREE: &str = "Referee";
 
 impl RefereeFlags {
-    /// Whether the referee is asked for.
-    pub fn is_given(&self) -> bool {
-        self.referee
-    }
-
-    /// Whether it is about one curve, which is then also run at several n.
-    pub fn is_one(&self) -> bool {
-        self.curves.is_none()
-    }
-
     /// The spec of the members: what `curvelax run --accurate` makes of these flags.
     pub fn spec(self, method: Spec) -> Spec {
         let amplitude = if self.curves.is_some() { method.amplitude.clone() } else { 0.0.into() };

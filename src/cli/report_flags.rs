@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{flags, note, parsers, print, signals};
+use super::{flags, note, parsers, print, print_json, signals};
 use crate::{
     error::{Error, Result},
     files::{
@@ -41,59 +41,41 @@ pub struct ReportFlags {
         long, value_name = "DURATION", value_parser = parsers::duration, allow_hyphen_values = true, default_value = "5s",
         help_heading = flags::OUTPUT
     )]
-    checkpoint_every: Duration,
+    pub checkpoint_every: Duration,
 }
 
 impl ReportFlags {
-    /// Checks that the results in `out` can be printed as requested.
-    ///
-    /// # Errors
-    /// [`Error::Request`] for a name that JSON cannot represent.
-    pub fn check_name(&self, out: &Path) -> Result<()> {
-        check_name(self.json, out)
-    }
-
     /// Reports the end of the run in `out`: the one that was just completed, or one that was finished before.
     ///
     /// # Errors
     /// As [`RunVerdict::check`], and those of reading the run.
     pub fn ended(&self, completed: Option<Completed>, out: &Path) -> Result<()> {
-        match completed {
-            Some(completed) => self.completed(completed),
-            None => self.finished(out),
-        }
-    }
-
-    /// Reports on the finished run in `out` as at its end: its results as JSON, if requested, and
-    /// whether it holds what was asked for.
-    fn finished(&self, out: &Path) -> Result<()> {
-        let provenance = reader::provenance(out)?;
-        let verdict = match self.json || RunVerdict::needs_statistics(&provenance) {
-            false => RunVerdict::new(&provenance, None),
-            true => {
-                let Finished { mut tally, .. } = Finished::read(out)?;
-                let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
-                if self.json {
-                    let files = listed(|name| out.join(name).exists());
-                    print(&Document::new(&provenance, &provenance.spec, &statistics, out, &files).to_json()?)?;
+        let verdict = match completed {
+            Some(Completed { text, verdict }) => {
+                if self.json || !self.quiet {
+                    print(&text)?;
                 }
-                RunVerdict::new(&provenance, Some(&statistics))
+                verdict
             }
+            None => self.finished(out)?,
         };
         verdict.check(self.strict, &out.join(names::SUMMARY))
     }
 
-    /// Prints the results of a run that was just completed.
-    fn completed(&self, Completed { text, verdict, out }: Completed) -> Result<()> {
-        if self.json || !self.quiet {
-            print(&text)?;
+    /// Prints the results of the finished run in `out` as JSON, if requested, and returns whether it holds what was
+    /// asked for.
+    fn finished(&self, out: &Path) -> Result<RunVerdict> {
+        let provenance = reader::provenance(out)?;
+        if !self.json && !RunVerdict::needs_statistics(&provenance) {
+            return Ok(RunVerdict::new(&provenance, None));
         }
-        verdict.check(self.strict, &out.join(names::SUMMARY))
-    }
-
-    /// The interval between checkpoints.
-    pub fn checkpoint_every(&self) -> Duration {
-        self.checkpoint_every
+        let Finished { mut tally, .. } = Finished::read(out)?;
+        let statistics = EnsembleStatistics::new(&provenance.spec, &mut tally)?;
+        if self.json {
+            let files = listed(|name| out.join(name).exists());
+            print_json(&Document::new(&provenance, &statistics, out, &files))?;
+        }
+        Ok(RunVerdict::new(&provenance, Some(&statistics)))
     }
 }
 
@@ -117,11 +99,14 @@ impl Host for ReportFlags {
 
     fn options_with(&self, stop: Stop) -> ReportOptions {
         let (since, progress, every) = (Instant::now(), Progress::new(self.quiet), self.checkpoint_every);
-        ReportOptions { since, progress, every, stop, patience: PATIENCE }
+        ReportOptions { since, progress, every, stop, patience: PATIENCE, see: Box::new(|_| ()) }
     }
 }
 
-/// Does the same as [`ReportFlags::check_name`], if `json` is set.
+/// Checks that results in `out` can be printed, as `json` if that is set.
+///
+/// # Errors
+/// [`Error::Request`] for a name that JSON cannot represent.
 pub fn check_name(json: bool, out: &Path) -> Result<()> {
     match json && out.to_str().is_none() {
         true => Err(Error::value(

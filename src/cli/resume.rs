@@ -3,7 +3,11 @@
 
 use std::path::PathBuf;
 
-use super::{flags::MACHINE, parsers, report_flags::ReportFlags};
+use super::{
+    flags::MACHINE,
+    parsers,
+    report_flags::{ReportFlags, check_name},
+};
 use crate::{
     ensemble::request::spec::BackendChoice,
     error::Result,
@@ -45,7 +49,7 @@ pub struct ResumeArgs {
 /// Runs the command.
 pub fn resume(args: ResumeArgs) -> Result<()> {
     let ResumeArgs { run, backend, adapter, threads, options } = args;
-    options.check_name(&run)?;
+    check_name(options.json, &run)?;
     let place = ResumePlace { backend, adapter, threads, why: None };
     options.ended(session::resume(&run, place, &options)?, &run)
 }

@@ -2,12 +2,15 @@
 
 use std::path::PathBuf;
 
-use super::{dry_run, flags, print, report_flags::ReportFlags};
+use super::{
+    dry_run, flags, print,
+    report_flags::{ReportFlags, check_name},
+};
 use crate::{
     ensemble::Spec,
     error::{Error, Result},
     files::{Existing, OutputFolder},
-    session::{self, Host, PlacedStudy, RunPlan},
+    session::{self, Host, PlacedStudy},
 };
 
 const EXAMPLES: &str = "\
@@ -78,7 +81,7 @@ pub fn run(args: RunArgs) -> Result<()> {
     if let (false, Some(out)) = (print_spec || dry_run || resume, &out) {
         OutputFolder::check_place(out, force)?;
     }
-    let placed = PlacedStudy::of(RunPlan::new(request, options.as_ref(), &host)?)?;
+    let placed = PlacedStudy::plan(request, options.as_ref(), &host)?;
     if print_spec {
         return print(&placed.study.spec().to_toml()?);
     }
@@ -87,7 +90,7 @@ pub fn run(args: RunArgs) -> Result<()> {
         return dry_run::dry_run(placed, &options.stop, &host);
     }
     let out = out.ok_or_else(|| Error::Request("--out DIR: a run needs a folder for its results".into()))?;
-    host.check_name(&out)?;
+    check_name(host.json, &out)?;
     let begun = if resume { session::begun(&out)? } else { None };
     let completed = match begun {
         Some(begun) => session::resume_like(begun, &placed.study, asked, &host)?,

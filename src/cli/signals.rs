@@ -25,17 +25,22 @@ const SHORT_PATIENCE: Duration = Duration::from_millis(1000);
 /// Time for the reader of stderr to accept the last message.
 const LAST_WORD: Duration = Duration::from_millis(100);
 
+/// Receives signals and forwards those that ask for the end, until closed.
+type SignalListener = Box<dyn FnOnce(&mut dyn FnMut(Cause)) + Send>;
+/// Ends the reception.
+type ListenerHandle = Box<dyn FnOnce() + Send>;
+
 /// From now on, forwards requests to end this process to `stop`; also when the time `most` is over.
 ///
 /// # Errors
 /// [`Error::Failed`](crate::Error::Failed) if the system has no threads or no pipe for it.
 pub fn watch(stop: &Stop, most: Option<Duration>) -> Result<()> {
-    let (mut listener, closing) = system::listener()?;
+    let (forward, close) = system::listener()?;
     let (ask, asked) = channel();
     let (to_stop, at_end) = (stop.clone(), stop.clone());
-    threads::start("clock", move || clock(&at_end, &asked, most, closing))?;
+    threads::start("clock", move || clock(&at_end, &asked, most, close))?;
     threads::start("signals", move || {
-        listener.forward(|cause| {
+        forward(&mut |cause| {
             to_stop.ask(cause);
             // The clock is gone if the process is ending.
             let _ = ask.send(());
@@ -58,8 +63,8 @@ fn last_word(stop: &Stop) -> Option<crate::Error> {
 }
 
 /// Waits until the run is `asked` to stop or `most` is over, and then for its end. When time is up, whatever is still
-/// running is ended: a checkpoint is on disk.
-fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, listener: system::ListenerHandle) {
+/// running is ended, after `close` ended the reception of signals: a checkpoint is on disk.
+fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, close: impl FnOnce()) {
     match most.map_or_else(|| asked.recv().map_err(Into::into), |most| asked.recv_timeout(most)) {
         Ok(()) => {}
         Err(RecvTimeoutError::Timeout) => stop.ask(Cause::MaxTime),
@@ -71,7 +76,7 @@ fn clock(stop: &Stop, asked: &Receiver<()>, most: Option<Duration>, listener: sy
         Err(RecvTimeoutError::Disconnected) => return,
     }
     if let Some(error) = last_word(stop) {
-        listener.close();
+        close();
         thread::sleep(LAST_WORD);
         system::exit(error.exit_code());
     }
@@ -94,41 +99,32 @@ mod system {
     use signal_hook::{
         consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ},
         flag,
-        iterator::{Handle, Signals},
+        iterator::Signals,
         low_level,
     };
 
     use super::*;
     use crate::Error;
 
-    /// Receives the signals.
-    pub struct SignalListener(Signals);
-    /// Ends the reception.
-    pub type ListenerHandle = Handle;
-
     pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
         let ignored = ignored();
         let received = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-        let signals = Signals::new(received).map_err(|e| {
+        let mut signals = Signals::new(received).map_err(|e| {
             Error::Failed(format!(
                 "cannot receive signals: {e}; raise the limit of open files (ulimit -n), or close some"
             ))
         })?;
         let closing = signals.handle();
-        Ok((SignalListener(signals), closing))
-    }
-
-    impl SignalListener {
-        /// Forwards signals that ask for the end, until closed.
-        pub fn forward(&mut self, mut ask: impl FnMut(Cause)) {
-            for signal in self.0.forever() {
+        let forward = move |ask: &mut dyn FnMut(Cause)| {
+            for signal in signals.forever() {
                 ask(match signal {
                     SIGINT => Cause::Interrupt,
                     SIGHUP => Cause::Hangup,
                     _ => Cause::Terminate,
                 });
             }
-        }
+        };
+        Ok((Box::new(forward), Box::new(move || closing.close())))
     }
 
     /// The signals that the parent process wants ignored, as with `nohup`: bit i - 1 for signal i. Available on Linux
@@ -153,28 +149,17 @@ mod system {
 /// The system ends the process; a run loses the work since its last checkpoint.
 #[cfg(not(unix))]
 mod system {
-    use std::sync::mpsc::Sender;
-
     use super::*;
 
-    pub struct SignalListener(Receiver<()>);
-    pub struct ListenerHandle(Sender<()>);
-
     pub fn listener() -> Result<(SignalListener, ListenerHandle)> {
-        let (closing, listener) = channel();
-        Ok((SignalListener(listener), ListenerHandle(closing)))
-    }
-
-    impl SignalListener {
-        pub fn forward(&mut self, _: impl FnMut(Cause)) {
-            let _ = self.0.recv();
-        }
-    }
-
-    impl ListenerHandle {
-        pub fn close(self) {
-            let _ = self.0.send(());
-        }
+        let (closing, closed) = channel::<()>();
+        let forward = move |_: &mut dyn FnMut(Cause)| {
+            let _ = closed.recv();
+        };
+        let close = move || {
+            let _ = closing.send(());
+        };
+        Ok((Box::new(forward), Box::new(close)))
     }
 
     pub fn outlive_full_files() {}

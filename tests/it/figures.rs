@@ -15,6 +15,10 @@ use crate::common::{
     program::{Row, column, positions},
 };
 
+fn named(name: &str) -> &'static Figure {
+    FIGURES.iter().find(|figure| figure.name == name).unwrap()
+}
+
 fn figure(folder: &Path, arguments: &str) -> Output {
     curvelax(folder, &format!("figure {arguments}"))
 }
@@ -129,7 +133,7 @@ fn a_figure_shows_its_data_in_axes_of_one_scale() {
         ["fig1a", "fig1b"].map(|name| (text(&home, &format!("{name}.csv")), text(&home, &format!("{name}.svg"))));
     for ((csv, svg), name) in [(&a, "fig1a"), (&b, "fig1b")] {
         assert_eq!(csv.lines().next().unwrap(), "member,t,i,x,y,k,r");
-        let (rows, times) = (rows(csv), Figure::find(name).unwrap().times);
+        let (rows, times) = (rows(csv), named(name).times);
         assert_eq!(rows.len(), times.len() * POINTS);
         for (chunk, t) in rows.chunks(POINTS).zip(times) {
             assert!(column(chunk, "t").iter().all(|found| found == t));
@@ -146,7 +150,7 @@ fn a_figure_shows_its_data_in_axes_of_one_scale() {
 
 /// Longest over shortest edge of the last curve.
 fn mesh_ratio(name: &str) -> f64 {
-    let figure = Figure::find(name).unwrap();
+    let figure = named(name);
     figure.simulate(&figure.spec().unwrap(), Progress::Quiet).unwrap().outcome.end.mesh_ratio
 }
 
@@ -180,7 +184,7 @@ fn distance(a: &Ended, b: &Ended) -> f64 {
 
 #[test]
 fn sweeps_would_draw_the_same_picture() {
-    let [a, b] = ["fig1a", "fig1b"].map(|name| Figure::find(name).unwrap());
+    let [a, b] = ["fig1a", "fig1b"].map(named);
     for figure in [a, b] {
         let apart = distance(&ended(figure, Solver::Direct), &ended(figure, Solver::GaussSeidel));
         eprintln!("{}: {apart:e}", figure.name);

@@ -8,10 +8,10 @@ use std::{
 };
 
 use curvelax::{
-    ensemble::Spec,
+    ensemble::{Snapshot, Spec},
     files::{Existing, state::checkpoint},
     report::{Cause, Progress, ReportOptions, ResultFormat, Stop},
-    session::{Host, PlacedStudy, ResumePlace, RunPlan, begin, resume},
+    session::{Host, PlacedStudy, ResumePlace, begin, resume},
 };
 use tempfile::TempDir;
 
@@ -217,7 +217,8 @@ impl Host for Patient {
             }
         };
         let progress = Progress::Callback(Box::new(tell));
-        ReportOptions { since: Instant::now(), progress, every: Duration::ZERO, stop, patience: Duration::MAX }
+        let (since, every, see) = (Instant::now(), Duration::ZERO, Box::new(|_: &[Snapshot]| ()));
+        ReportOptions { since, progress, every, stop, patience: Duration::MAX, see }
     }
 }
 
@@ -229,7 +230,7 @@ fn a_run_that_is_interrupted_at_finer_levels_ends_as_if_it_were_not() {
     let spec = Spec { curves: 60, ..Spec::from_toml(text).unwrap() };
     let options = |host: &Patient| host.options().unwrap();
     let run = |out: &str, host: Patient| {
-        let placed = RunPlan::new(spec.clone(), None, &host).and_then(PlacedStudy::of).unwrap();
+        let placed = PlacedStudy::plan(spec.clone(), None, &host).unwrap();
         begin(placed, &home.path().join(out), Existing::Refused, options(&host), &host)
     };
     run("whole", Patient(None)).unwrap();

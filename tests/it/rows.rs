@@ -77,6 +77,7 @@ fn options() -> ReportOptions {
         every: Duration::from_secs(1000),
         stop: Stop::default(),
         patience: Duration::from_secs(2),
+        see: Box::new(|_| ()),
     }
 }
 

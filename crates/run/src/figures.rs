@@ -50,17 +50,8 @@ pub struct Figure {
     pub redistribution: bool,
     /// Times shown, ascending; the run ends at the last.
     pub times: &'static [f64],
-    /// How the curves are laid out.
-    pub layout: Layout,
-}
-
-/// How a figure lays out its curves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
-    /// All times in one panel.
-    Overlaid,
-    /// One panel for each time.
-    SideBySide,
+    /// Whether each time has a panel of its own.
+    pub side_by_side: bool,
 }
 
 /// All figures, in the paper's order.
@@ -75,7 +66,7 @@ pub const FIGURES: [Figure; 4] = [
         tau: 1e-3,
         redistribution: false,
         times: &[0.0, 0.05, 0.3, 2.0],
-        layout: Layout::Overlaid,
+        side_by_side: false,
     },
     Figure {
         name: "fig1b",
@@ -87,7 +78,7 @@ pub const FIGURES: [Figure; 4] = [
         tau: 1e-3,
         redistribution: true,
         times: &[0.0, 0.05, 0.3, 2.0],
-        layout: Layout::Overlaid,
+        side_by_side: false,
     },
     Figure {
         name: "fig1c",
@@ -100,7 +91,7 @@ pub const FIGURES: [Figure; 4] = [
         tau: 1e-6,
         redistribution: true,
         times: &[0.0, 0.0005, 0.005, 0.02, 0.17],
-        layout: Layout::Overlaid,
+        side_by_side: false,
     },
     Figure {
         name: "fig2",
@@ -113,16 +104,11 @@ pub const FIGURES: [Figure; 4] = [
         tau: 1e-7,
         redistribution: true,
         times: &[0.0, 0.0005, 0.005],
-        layout: Layout::SideBySide,
+        side_by_side: true,
     },
 ];
 
 impl Figure {
-    /// Returns the figure called `name`.
-    pub fn find(name: &str) -> Option<&'static Figure> {
-        FIGURES.iter().find(|figure| figure.name == name)
-    }
-
     /// The run that makes the figure: one unperturbed member on the CPU, in f64 and solved directly, so that all
     /// machines with the same mathematical library give the same bits.
     pub fn spec(&self) -> Result<Spec> {
@@ -173,12 +159,10 @@ impl Figure {
     pub fn plot(&self, ended: &Ended) -> Plot {
         let curves: Vec<PlottedCurve> =
             ended.rows.snapshots.iter().map(|s| PlottedCurve::at(s.t, &s.x, &s.y)).collect();
-        let panels = match self.layout {
-            Layout::Overlaid => vec![PlotPanel { heading: None, curves }],
-            Layout::SideBySide => curves
-                .into_iter()
-                .map(|curve| PlotPanel { heading: Some(curve.label.clone()), curves: vec![curve] })
-                .collect(),
+        let own = |curve: PlottedCurve| PlotPanel { heading: Some(curve.label.clone()), curves: vec![curve] };
+        let panels = match self.side_by_side {
+            true => curves.into_iter().map(own).collect(),
+            false => vec![PlotPanel { heading: None, curves }],
         };
         Plot { title: self.title.into(), subtitle: self.parameters(), panels }
     }
@@ -232,9 +216,7 @@ mod tests {
             assert_eq!(spec.snapshots, figure.times);
             assert_eq!((spec.backend, spec.precision), (BackendChoice::Cpu, Some(Precision::F64)));
             assert!(FIGURES[..i].iter().all(|other| other.name != figure.name));
-            assert_eq!(Figure::find(figure.name), Some(figure));
         }
-        assert_eq!(Figure::find("fig3"), None);
     }
 
     #[test]
@@ -244,7 +226,7 @@ mod tests {
 
     #[test]
     fn a_curve_that_fails_makes_no_figure() {
-        let figure = Figure::find("fig1a").unwrap();
+        let figure = &FIGURES[0];
         // Steps so long that the first merges nodes.
         let spec = Spec { shape: "nonconvex".parse().unwrap(), tau: Some(0.05.into()), ..figure.spec().unwrap() };
         let error = figure.simulate(&spec, Progress::Quiet).unwrap_err();

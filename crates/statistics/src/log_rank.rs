@@ -14,18 +14,23 @@
 
 use std::{borrow::Borrow, cmp::Reverse, collections::BinaryHeap};
 
+use serde::Serialize;
+
 use super::{finite, sample::Sample, special::chi_square_tail, sum::Sum};
 
 /// Result of the test.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LogRank {
     /// χ², chi-square distributed if the groups are alike and there are enough events.
+    #[serde(rename = "chi2")]
     pub statistic: f64,
     /// Number of groups with members at risk at the first event, minus one.
     pub degrees_of_freedom: usize,
     /// Probability of a statistic at least as large if the groups are alike; never 0, but the smallest normal number.
+    #[serde(rename = "p")]
     pub p_value: f64,
     /// The groups, in the order given.
+    #[serde(skip)]
     pub groups: Vec<GroupEvents>,
 }
 

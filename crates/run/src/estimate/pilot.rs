@@ -385,13 +385,9 @@ fn pilot(
 
 /// Rows of the series and snapshots of a member that reaches the final time, the maximum over all cells.
 fn most_rows(cohort: &[Cell]) -> [f64; 2] {
-    let snapshots = cohort.iter().map(|Cell { spec, .. }| spec.snapshots.len() as f64);
-    [cohort.iter().map(series_of).fold(0.0, f64::max), snapshots.fold(0.0, f64::max)]
-}
-
-/// Rows of the series of a member that reaches the final time.
-fn series_of(Cell { spec, .. }: &Cell) -> f64 {
-    spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0)
+    let specs = || cohort.iter().map(|cell| &cell.spec);
+    let series = specs().map(|spec| spec.series.map_or(0.0, |every| spec.final_time() / every + 1.0));
+    [series.fold(0.0, f64::max), specs().map(|spec| spec.snapshots.len() as f64).fold(0.0, f64::max)]
 }
 
 /// The cost of `all` members from that of the pilots, each scaled to its end.

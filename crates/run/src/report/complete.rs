@@ -20,7 +20,7 @@ use curvelax_study::{
     results::{
         RunVerdict,
         cells::{EnsembleStatistics, to_csv},
-        provenance::Provenance,
+        provenance::{Provenance, json},
         tally::Tally,
     },
 };
@@ -64,20 +64,6 @@ pub fn listed(is_there: impl Fn(&str) -> bool) -> Vec<&'static str> {
     tables.chain(parquet).chain([names::REPORT, PLOTS, names::RUN]).chain(shard).collect()
 }
 
-/// The table `name` as Parquet, if it is one of the `files`.
-fn as_parquet(
-    name: &str,
-    files: &[PartFile],
-    spec: &Spec,
-    statistics: &EnsembleStatistics,
-    folder: &OutputFolder,
-) -> Result<Option<PartFile>> {
-    let (Some(file), Some(own)) = (files.iter().find(|file| file.name() == name), names::as_parquet(name)) else {
-        return Ok(None);
-    };
-    parquet::write(file.part(), &columns(name, spec, statistics)?, spec, folder.file(&own)?).map(Some)
-}
-
 impl Complete<'_> {
     /// Gives all files their final names, once all are on disk, and returns the text for stdout and the verdict.
     /// `files` and `store` hold the results of the members; `shard` is [what a merge needs besides
@@ -111,7 +97,11 @@ impl Complete<'_> {
         files.push(Table::of(folder.file(names::EXPLAINED)?, &explained.rows)?);
         if spec.tables == Tables::Parquet {
             for name in names::TABLES {
-                files.extend(as_parquet(name, &files, spec, statistics, folder)?);
+                let file = files.iter().find(|file| file.name() == name);
+                if let Some((file, own)) = file.zip(names::as_parquet(name)) {
+                    let columns = &columns(name, spec, statistics)?;
+                    files.push(parquet::write(file.part(), columns, spec, folder.file(&own)?)?);
+                }
             }
         }
         if let Some(shard) = shard {
@@ -143,7 +133,7 @@ impl Complete<'_> {
         let (folder, files) = (folder.path(), &names[..]);
         let text = match form {
             ResultFormat::Overview => Overview { spec, platform, tally, statistics, wall, folder, files }.to_string(),
-            ResultFormat::Json => Document::new(provenance, spec, statistics, folder, files).to_json()?,
+            ResultFormat::Json => json(&Document::new(provenance, statistics, folder, files), "JSON")?,
         };
         Ok((text, RunVerdict::new(provenance, Some(statistics))))
     }

@@ -6,12 +6,12 @@ use std::{collections::BTreeMap, path::Path};
 use serde::Serialize;
 use toml::Value;
 
-use curvelax_base::error::Result;
 use curvelax_ensemble::{Spec, Status};
+use curvelax_statistics::LogRank;
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     comparison::{CellComparison, CellDifference, LeftOut},
-    provenance::{Provenance, json},
+    provenance::Provenance,
     scaling::Scaling,
     times::Numbers,
 };
@@ -25,7 +25,7 @@ pub struct Document<'a> {
     files: &'a [&'static str],
     cells: Vec<CellDocument<'a>>,
     /// Whether the cells could have one distribution; null if the test does not hold.
-    log_rank: Option<LogRankDocument>,
+    log_rank: Option<&'a LogRank>,
     /// The differences from the first cell; null unless cells share their random numbers.
     paired: Option<Vec<PairedDocument>>,
     /// Why the cells of a study are not compared; null if they are.
@@ -33,7 +33,7 @@ pub struct Document<'a> {
     /// The groups of outlines; null unless they are grouped.
     groups: Option<Vec<GroupDocument<'a>>>,
     /// For each cell, whether its groups could have one distribution; null if the test does not hold.
-    groups_log_rank: Option<Vec<Option<LogRankDocument>>>,
+    groups_log_rank: Option<Vec<Option<&'a LogRank>>>,
     /// The medians as a power of the swept value; null if no single scale is swept.
     power_law: Option<PowerLawDocument>,
 }
@@ -72,13 +72,6 @@ struct GroupDocument<'a> {
 }
 
 #[derive(Serialize)]
-struct LogRankDocument {
-    chi2: f64,
-    degrees_of_freedom: usize,
-    p: f64,
-}
-
-#[derive(Serialize)]
 struct PairedDocument {
     cell: u64,
     against: u64,
@@ -91,23 +84,12 @@ struct PairedDocument {
     w: Option<f64>,
     p: Option<f64>,
     exact: Option<bool>,
-    left_out: BTreeMap<&'static str, usize>,
-}
-
-impl LogRankDocument {
-    fn of(comparison: &CellComparison) -> Option<LogRankDocument> {
-        comparison.log_rank().map(|test| LogRankDocument {
-            chi2: test.statistic,
-            degrees_of_freedom: test.degrees_of_freedom,
-            p: test.p_value,
-        })
-    }
+    left_out: LeftOut,
 }
 
 impl PairedDocument {
     fn new(of: &CellDifference) -> PairedDocument {
         let CellDifference { cell, pairs, equal, median, interval, test, left_out } = *of;
-        let LeftOut { later, earlier, unknown } = left_out;
         PairedDocument {
             cell,
             against: 0,
@@ -119,7 +101,7 @@ impl PairedDocument {
             w: test.map(|test| test.statistic),
             p: test.map(|test| test.p_value),
             exact: test.map(|test| test.exact),
-            left_out: [("later", later), ("earlier", earlier), ("unknown", unknown)].into(),
+            left_out,
         }
     }
 }
@@ -169,28 +151,23 @@ impl<'a> Document<'a> {
     /// Collects the document.
     pub fn new(
         run: &'a Provenance,
-        spec: &'a Spec,
         statistics: &'a EnsembleStatistics,
         folder: &'a Path,
         files: &'a [&'static str],
     ) -> Document<'a> {
+        let spec = &run.spec;
         let EnsembleStatistics { cells, comparison, groups, group_comparisons, scaling, .. } = statistics;
         let paired = comparison.paired_cells().map(|cells| cells.iter().map(PairedDocument::new).collect());
         let not_compared = comparison.refusal().map(String::from);
-        let log_rank = LogRankDocument::of(comparison);
+        let log_rank = comparison.log_rank();
         let of_group =
             |of: &'a GroupStatistics| GroupDocument { group: &of.group, times: CellDocument::new(spec, &of.times) };
         let is_grouped = spec.group_by.is_some();
         let groups = is_grouped.then(|| groups.iter().map(of_group).collect());
-        let groups_log_rank = is_grouped.then(|| group_comparisons.iter().map(LogRankDocument::of).collect());
+        let groups_log_rank = is_grouped.then(|| group_comparisons.iter().map(CellComparison::log_rank).collect());
         let power_law = scaling.as_ref().map(PowerLawDocument::new);
         let cells = cells.iter().map(|cell| CellDocument::new(spec, cell)).collect();
         Document { run, folder, files, cells, log_rank, paired, not_compared, groups, groups_log_rank, power_law }
-    }
-
-    /// Its text.
-    pub fn to_json(&self) -> Result<String> {
-        json(self, "JSON")
     }
 }
 
@@ -225,7 +202,7 @@ mod tests {
     use super::*;
     use curvelax_ensemble::Outcome;
     use curvelax_study::{
-        results::tally::Tally,
+        results::{provenance::json, tally::Tally},
         samples::{outcome, platform},
     };
 
@@ -243,7 +220,7 @@ mod tests {
         }
         let (platform, statistics) = (platform(), EnsembleStatistics::new(&spec, &mut tally).unwrap());
         let run = Provenance::new(&spec, &platform, &tally, &[], Duration::ZERO, Duration::ZERO);
-        let text = Document::new(&run, &spec, &statistics, Path::new("out"), &["summary.csv"]).to_json().unwrap();
+        let text = json(&Document::new(&run, &statistics, Path::new("out"), &["summary.csv"]), "JSON").unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();
 
         let alone: serde_json::Value = serde_json::from_str(&run.to_json().unwrap()).unwrap();

@@ -4,6 +4,7 @@
 use glam::DVec2;
 
 use super::members_layout::{OWN_SCALES, PanelLayout, draw_bar};
+use curvelax_base::text::rounded;
 use curvelax_curve::polygon;
 use curvelax_draw::{
     medium::Medium,
@@ -127,16 +128,6 @@ pub struct Wording {
     pub rests: Vec<Vec<DVec2>>,
 }
 
-impl Wording {
-    fn has_cells(&self) -> bool {
-        self.cells.iter().any(|cell| !cell.is_empty())
-    }
-
-    fn has_rests(&self) -> bool {
-        self.rests.iter().any(|rest| !rest.is_empty())
-    }
-}
-
 /// The gallery of the first [`MAX_PANELS`] of `films`, as the text of an SVG file.
 pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     let panels: Vec<MemberPanel> = films.iter().take(MAX_PANELS).map(MemberPanel::new).collect();
@@ -145,12 +136,13 @@ pub fn draw(medium: Medium, films: &[Film], wording: &Wording) -> String {
     let bounds: Vec<_> = panels.iter().filter_map(MemberPanel::bounds).collect();
     let layout = PanelLayout::new(&bounds, side, PADDING, MIN_HEIGHT);
     let frame = layout.frame;
-    let caption = CAPTION + if wording.has_cells() { LINE } else { 0.0 };
+    let has_cells = wording.cells.iter().any(|cell| !cell.is_empty());
+    let caption = CAPTION + if has_cells { LINE } else { 0.0 };
     let pitch = frame + DVec2::new(GAP, caption);
     let width = 2.0 * MARGIN + columns as f64 * pitch.x - GAP;
     let height = HEAD + rows as f64 * pitch.y + FOOT;
 
-    let rests = wording.has_rests();
+    let rests = wording.rests.iter().any(|rest| !rest.is_empty());
     let own = if rests { STYLE_OF_RESTS } else { "" };
     let style = [&style(medium), own].concat();
     let mut svg = Svg::new(width, height, &style, "Members before, during and after relaxation");
@@ -235,7 +227,7 @@ fn draw_panel(
     let mut across = String::new();
     if let Some(bounds) = panel.bounds() {
         if layout.common.is_none() {
-            across = format!(", {}{unit} across", rounded((bounds.1 - bounds.0).max_element()));
+            across = format!(", {}{unit} across", rounded((bounds.1 - bounds.0).max_element(), 3));
         }
         let place = layout.place(bounds, corner);
         let place = |nodes: &[DVec2]| nodes.iter().map(|node| place(*node)).collect::<Vec<_>>();
@@ -270,15 +262,9 @@ fn draw_scale(svg: &mut Svg, left: DVec2, layout: &PanelLayout, largest: f64, un
     let most = 0.5 * layout.frame.x / scale;
     let power = 10_f64.powi(most.log10().floor() as i32);
     let length = [5.0, 2.0, 1.0].map(|digit| digit * power).into_iter().find(|l| *l <= most).unwrap_or(power);
-    let shown = rounded(length);
+    let shown = rounded(length, 3);
     let named = if unit.is_empty() { format!("length {shown}") } else { format!("{shown}{unit}") };
     draw_bar(svg, [left, left + DVec2::new(length * scale, 0.0)], &named);
-}
-
-/// `value` to three significant digits.
-fn rounded(value: f64) -> String {
-    let short: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    if short == 0.0 || (1e-3..1e6).contains(&short.abs()) { short.to_string() } else { format!("{short:e}") }
 }
 
 #[cfg(test)]
@@ -371,6 +357,6 @@ mod tests {
 
     #[test]
     fn numbers_in_captions_are_short() {
-        assert_eq!([0.123456, 2.0, 1234.5, 1e-7].map(rounded), ["0.123", "2", "1230", "1e-7"]);
+        assert_eq!([0.123456, 2.0, 1234.5, 1e-7].map(|value| rounded(value, 3)), ["0.123", "2", "1230", "1e-7"]);
     }
 }

@@ -52,8 +52,8 @@ pub struct Shards {
     unfinished: Vec<(Option<u64>, PathBuf, String)>,
     /// The spec of the whole study.
     spec: Spec,
-    /// N.
-    count: u64,
+    /// N, the number of shards of the study; those without members do not count.
+    pub count: u64,
 }
 
 impl Shards {
@@ -67,6 +67,10 @@ impl Shards {
             Found::Unfinished { path, spec, .. } => Some((path.clone(), *spec.clone()?)),
         };
         let Some((first, own)) = found.iter().find_map(of) else {
+            let unfinished = |found: &Found| match found {
+                Found::Done(part) => part.path.display().to_string(),
+                Found::Unfinished { path, why, .. } => format!("{}: {why}", path.display()),
+            };
             let folders: Vec<String> = found.iter().map(unfinished).collect();
             let message = format!("no folder says which study it is a shard of: {}", listed(&folders, NAMED, "; "));
             return Err(Error::Request(message));
@@ -80,21 +84,16 @@ impl Shards {
             spec: Spec { shard: None, ..own.clone() },
             count: shard.count(),
         };
-        let mut places: BTreeMap<u64, PathBuf> = BTreeMap::new();
         for one in found {
-            let told = of(&one);
-            let index = match &told {
-                Some((path, spec)) => Some(same_study((path, spec), (&first, &own))?),
-                None => None,
-            };
+            let index = of(&one).map(|(path, spec)| same_study((&path, &spec), (&first, &own))).transpose()?;
             match one {
                 Found::Done(part) => {
-                    if let Some(other) = places.insert(part.shard.index(), part.path.clone()) {
-                        let (one, other) = (part.path.display(), other.display());
-                        let message = format!("{one}: shard {} is duplicated in {other}; give one of them", part.shard);
+                    let (path, shard) = (part.path.clone(), part.shard);
+                    if let Some(other) = shards.parts.insert(shard.index(), *part) {
+                        let (one, other) = (path.display(), other.path.display());
+                        let message = format!("{one}: shard {shard} is duplicated in {other}; give one of them");
                         return Err(Error::Request(message));
                     }
-                    shards.parts.insert(part.shard.index(), *part);
                 }
                 Found::Unfinished { path, why, .. } => shards.unfinished.push((index, path, why)),
             }
@@ -128,11 +127,6 @@ impl Shards {
         Ok(())
     }
 
-    /// Number of shards of the study; those without members do not count.
-    pub fn count(&self) -> u64 {
-        self.count
-    }
-
     /// The shards that are not complete, as ranges of their numbers: at most one more than there are folders, however
     /// many shards the study has.
     pub fn missing(&self) -> Vec<RangeInclusive<u64>> {
@@ -143,11 +137,8 @@ impl Shards {
     fn all_but(&self, others: impl Iterator<Item = u64>) -> Vec<RangeInclusive<u64>> {
         match &self.spec.only {
             Some(only) => {
-                let mut own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
-                for index in others {
-                    own.remove(&index);
-                }
-                let own: Vec<u64> = own.into_iter().collect();
+                let own: BTreeSet<u64> = only.iter().map(|member| member % self.count).collect();
+                let own: Vec<u64> = own.difference(&others.collect()).copied().collect();
                 own.chunk_by(|a, b| a + 1 == *b).map(|run| run[0]..=run[run.len() - 1]).collect()
             }
             None => {
@@ -262,13 +253,6 @@ fn same_study(one: (&PathBuf, &Spec), own: (&PathBuf, &Spec)) -> Result<u64> {
         (Some(shard), Some(own)) if shard.count() == own.count() => Ok(shard.index()),
         (Some(shard), Some(own)) => refuse(format!("it says shard {shard}, but {own} is there")),
         _ => refuse("it is not a shard".into()),
-    }
-}
-
-fn unfinished(found: &Found) -> String {
-    match found {
-        Found::Done(part) => part.path.display().to_string(),
-        Found::Unfinished { path, why, .. } => format!("{}: {why}", path.display()),
     }
 }
 

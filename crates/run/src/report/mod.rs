@@ -18,7 +18,6 @@ pub mod words;
 
 use std::{
     collections::BTreeMap,
-    path::Path,
     time::{Duration, Instant},
 };
 
@@ -28,7 +27,7 @@ pub use stop::{Cause, Stop};
 
 use complete::Complete;
 use curvelax_base::{
-    error::{Error, Result},
+    error::Result,
     text::{duration, plural, quoted},
 };
 use curvelax_ensemble::{
@@ -44,10 +43,7 @@ use curvelax_files::{
         outlines, shard,
     },
 };
-use curvelax_study::{
-    placement::Platform,
-    results::{RunVerdict, tally::Tally},
-};
+use curvelax_study::results::{RunVerdict, tally::Tally};
 
 /// Checkpoints use at most one part in `SHARE_OF_STATES` of the time of a run.
 const SHARE_OF_STATES: u32 = 20;
@@ -65,34 +61,37 @@ pub struct ReportOptions {
     /// Time after which a run that was asked to stop is ended even if it has not reached a point where all its work can
     /// be saved.
     pub patience: Duration,
+    /// Sees the snapshots of members, in time order and before they are stored. Those that a resumed run has stored
+    /// earlier are not seen again.
+    pub see: SnapshotWatch,
 }
+
+/// Someone who looks at snapshots.
+pub type SnapshotWatch = Box<dyn FnMut(&[Snapshot])>;
 
 /// Everything written about a run.
 // The tables come before the folder: dropped first, they leave it empty for its clean-up.
 pub struct RunReport {
     growing: Growing,
-    folder: OutputFolder,
-    origin: Origin,
+    pub(crate) folder: OutputFolder,
+    /// The spec, where the run is computed, and where it was before.
+    pub(crate) origin: Origin,
     /// Nodes per member.
     points: usize,
-    tally: Tally,
+    pub(crate) tally: Tally,
     /// The first members.
     films: Vec<Film>,
     /// Relaxation times at the levels, by the rows of an earlier session.
-    levels: LevelTimes,
+    pub(crate) levels: LevelTimes,
     /// Members of the study.
     members: u64,
     /// Members of each stage; of a finer one none before it begins.
     stages: Vec<u64>,
-    /// Index of the stage.
-    stage: u64,
-    progress: Progress,
-    clock: Instant,
+    /// Index of the current stage, from 0.
+    pub(crate) stage: usize,
+    pub(crate) options: ReportOptions,
     /// Wall time before the interruption.
     earlier: Duration,
-    every: Duration,
-    stop: Stop,
-    patience: Duration,
     /// When the last checkpoint was complete, and how long it took.
     kept: (Instant, Duration),
     /// Whether the checkpoint contains any work.
@@ -108,7 +107,7 @@ impl RunReport {
         match outlines::save(&report.folder, study.outlines()).and_then(|()| report.checkpoint(&first)) {
             Ok(()) => Ok(report),
             Err(error) => {
-                let error = report.explain(error);
+                let error = report.folder.explain(error);
                 report.give_up();
                 Err(error)
             }
@@ -127,6 +126,7 @@ impl RunReport {
     ) -> Result<(RunReport, RunProgress)> {
         let Saved { head, progress, note } = kept;
         let CheckpointHead { origin, wall, stage, tables, store, rows, supplement, films } = head;
+        let stage = stage as usize;
         let growing = Growing::resume(&folder, study.spec(), study.points(), &tables, store.as_ref(), rows.as_ref())?;
         if note.is_some() {
             folder.forget_last_state()?;
@@ -136,8 +136,7 @@ impl RunReport {
         let tally = reader::rows(&place, study.spec(), &levels, supplement)?;
         let mut report = RunReport::new(folder, growing, study, origin, options);
         // Which members were to run at finer levels follows from their rows.
-        let finer =
-            study.stages().iter().zip(&mut report.stages).take(stage as usize + 1).filter(|(of, _)| of.is_selective());
+        let finer = study.stages().iter().zip(&mut report.stages).take(stage + 1).filter(|(of, _)| of.is_selective());
         finer.for_each(|(of, members)| *members = study.members_of(of, &levels));
         (report.films, report.earlier, report.stage) = (films, wall, stage);
         (report.tally, report.levels, report.has_begun) = (tally, levels, true);
@@ -145,8 +144,7 @@ impl RunReport {
     }
 
     fn new(folder: OutputFolder, growing: Growing, study: &Study, origin: Origin, options: ReportOptions) -> RunReport {
-        let ReportOptions { since, progress, every, stop, patience } = options;
-        stop.set_begun();
+        options.stop.set_begun();
         RunReport {
             growing,
             folder,
@@ -158,12 +156,8 @@ impl RunReport {
             members: study.member_count(),
             stages: study.stages().iter().map(|stage| if stage.is_selective() { 0 } else { stage.members }).collect(),
             stage: 0,
-            progress,
-            clock: since,
+            options,
             earlier: Duration::ZERO,
-            every,
-            stop,
-            patience,
             kept: (Instant::now(), Duration::ZERO),
             has_begun: false,
         }
@@ -171,38 +165,13 @@ impl RunReport {
 
     /// Begins stage number `stage`, of so many members; all members of earlier ones have ended.
     pub fn begin_stage(&mut self, stage: usize, members: u64) {
-        self.stage = stage as u64;
+        self.stage = stage;
         self.stages[stage] = members;
     }
 
     /// Members of the stages before the current one.
     pub fn before(&self) -> u64 {
-        self.stages.iter().take(self.stage as usize).sum()
-    }
-
-    /// Moves out the times of the levels that an earlier session left.
-    pub fn take_levels(&mut self) -> LevelTimes {
-        std::mem::take(&mut self.levels)
-    }
-
-    /// The output folder.
-    pub fn folder(&self) -> &Path {
-        self.folder.path()
-    }
-
-    /// Where the run is computed.
-    pub fn platform(&self) -> &Platform {
-        &self.origin.platform
-    }
-
-    /// Where it was computed before, one sentence each.
-    pub fn moves(&self) -> &[String] {
-        &self.origin.moves
-    }
-
-    /// Index of the current stage, from 0.
-    pub fn stage(&self) -> usize {
-        self.stage as usize
+        self.stages.iter().take(self.stage).sum()
     }
 
     /// Rows that are written, of members and of levels.
@@ -210,21 +179,11 @@ impl RunReport {
         self.tally.members() + self.tally.levels
     }
 
-    /// Members whose rows are written.
-    pub fn members(&self) -> u64 {
-        self.tally.members()
-    }
-
-    /// Replaces `error` by its cause if the folder was taken away.
-    pub fn explain(&self, error: Error) -> Error {
-        self.folder.explain(error)
-    }
-
     /// Ends a run that failed. Its checkpoint and its rows are kept, or removed if they contain no work. Returns
     /// whether the run can be resumed.
     pub fn give_up(mut self) -> bool {
         // A folder that was taken away is not touched any more.
-        let wanted = self.has_begun || self.stop.asked().is_some() || self.folder.check_claim().is_err();
+        let wanted = self.has_begun || self.options.stop.asked().is_some() || self.folder.check_claim().is_err();
         // A checkpoint that cannot be removed needs its rows.
         let stays = wanted || self.folder.forget_states().is_err();
         self.growing.keep(stays);
@@ -237,18 +196,13 @@ impl RunReport {
         self.growing.keep(true);
     }
 
-    /// The means to stop the run.
-    pub fn stop(&self) -> &Stop {
-        &self.stop
-    }
-
     /// Returns the head of a checkpoint, once everything is on disk.
     fn head(&mut self) -> Result<CheckpointHead> {
         let (tables, store, rows) = self.growing.mark()?;
         Ok(CheckpointHead {
             origin: self.origin.clone(),
             wall: self.wall(),
-            stage: self.stage,
+            stage: self.stage as u64,
             tables,
             store,
             rows,
@@ -258,7 +212,7 @@ impl RunReport {
     }
 
     fn wall(&self) -> Duration {
-        self.earlier.saturating_add(self.clock.elapsed())
+        self.earlier.saturating_add(self.options.since.elapsed())
     }
 
     fn so_far(&self) -> String {
@@ -271,11 +225,6 @@ impl RunReport {
         )
     }
 
-    /// What the user should know about the results so far.
-    pub fn warnings(&self) -> Vec<String> {
-        self.tally.warnings()
-    }
-
     /// Gives all files their final names with [`Complete::publish`]; `early` are the warnings given before.
     pub fn finish(mut self, spec: &Spec, early: &[String], form: ResultFormat) -> Result<(String, RunVerdict)> {
         // All rows are written: a run killed from now on only needs to draw its pictures again.
@@ -285,10 +234,10 @@ impl RunReport {
             Some(_) => Some(shard::to_bytes(&CheckpointHead { rows: None, ..self.head()? }, self.points, early)?),
             None => None,
         };
+        let wall = self.wall();
         // Dropped in reverse order: the folder last, after its files.
-        let RunReport { folder, tally, films, progress, origin, clock, earlier, growing, .. } = self;
-        progress.finish();
-        let wall = earlier.saturating_add(clock.elapsed());
+        let RunReport { folder, tally, films, options, origin, growing, .. } = self;
+        options.progress.finish();
         let (files, store, spill) = growing.ready()?;
         let Origin { platform, started, .. } = &origin;
         let warnings = &[early, &tally.warnings()].concat();
@@ -313,6 +262,7 @@ impl Sink for RunReport {
 
     fn member(&mut self, ended: &Ended) -> Result<()> {
         let Ended { outcome, portrait, mollified, unresolved, excess, .. } = ended;
+        (self.options.see)(&ended.rows.snapshots);
         // The tally may refuse it, so it comes first: rows that are written can always be read back.
         self.tally.add(outcome)?;
         self.growing.add(ended)?;
@@ -324,24 +274,25 @@ impl Sink for RunReport {
     }
 
     fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
+        (self.options.see)(snapshots);
         self.growing.spill(&self.folder, series, snapshots).map(Some)
     }
 
     fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
         let (before, all) = (self.before(), self.stages.iter().sum::<u64>());
         let share = (before as f64 + share * total as f64) / all.max(1) as f64;
-        self.progress.show(before + done, all, share, if all == self.members { "member" } else { "run" });
-        match self.stop.asked() {
-            Some((cause, when)) if when.elapsed() > self.patience => Err(cause.error(&self.so_far())),
+        self.options.progress.show(before + done, all, share, if all == self.members { "member" } else { "run" });
+        match self.options.stop.asked() {
+            Some((cause, when)) if when.elapsed() > self.options.patience => Err(cause.error(&self.so_far())),
             _ => Ok(()),
         }
     }
 
     fn next_request(&mut self) -> SinkRequest {
         let (since, took) = self.kept;
-        match self.stop.asked() {
+        match self.options.stop.asked() {
             Some((cause, _)) => SinkRequest::Stop(cause.error(&self.so_far())),
-            None if since.elapsed() >= self.every.max(SHARE_OF_STATES * took) => SinkRequest::Checkpoint,
+            None if since.elapsed() >= self.options.every.max(SHARE_OF_STATES * took) => SinkRequest::Checkpoint,
             None => SinkRequest::Continue,
         }
     }
@@ -353,7 +304,7 @@ impl Sink for RunReport {
         let resident = match &so_far.resident {
             Some(resident) => resident,
             None => {
-                known = checkpoint::in_progress(&self.folder, self.stage, so_far);
+                known = checkpoint::in_progress(&self.folder, self.stage as u64, so_far);
                 &known
             }
         };
@@ -361,7 +312,7 @@ impl Sink for RunReport {
         self.growing.keep(true);
         self.has_begun |= !so_far.early.is_empty() || !resident.is_empty();
         self.kept = (Instant::now(), begun.elapsed());
-        self.stop.set_kept();
+        self.options.stop.set_kept();
         Ok(())
     }
 }
@@ -391,7 +342,8 @@ mod tests {
 
     fn options(stop: &Stop) -> ReportOptions {
         let (since, every) = (Instant::now(), Duration::from_secs(1000));
-        ReportOptions { since, progress: Progress::Quiet, every, stop: stop.clone(), patience: PATIENCE }
+        let (stop, see) = (stop.clone(), Box::new(|_: &[Snapshot]| ()));
+        ReportOptions { since, progress: Progress::Quiet, every, stop, patience: PATIENCE, see }
     }
 
     fn begun(out: &Path, spec: &Spec, stop: &Stop) -> RunReport {
@@ -518,10 +470,10 @@ mod tests {
         let (spec, stop) = (Spec::default(), Stop::default());
         let mut running = begun(&home.path().join("out"), &spec, &stop);
         let hour = Duration::from_secs(3600);
-        running.every = hour;
+        running.options.every = hour;
         running.kept = (Instant::now(), Duration::ZERO);
         assert!(matches!(running.next_request(), SinkRequest::Continue));
-        running.every = Duration::ZERO;
+        running.options.every = Duration::ZERO;
         assert!(matches!(running.next_request(), SinkRequest::Checkpoint));
         // A checkpoint that took long is not saved again soon.
         running.kept.1 = hour;
@@ -559,7 +511,7 @@ mod tests {
             assert_eq!(kept.note, None);
             let study = Study::new(spec.clone()).unwrap();
             let (mut second, so_far) = RunReport::resume(folder, &study, kept, options(&Stop::default())).unwrap();
-            assert_eq!((so_far.next, second.members()), (1, 1));
+            assert_eq!((so_far.next, second.tally.members()), (1, 1));
             second.member(&ended(1, None)).unwrap();
             second.member(&so_far.early[&2]).unwrap();
             second.finish(&spec, &[], ResultFormat::Overview).unwrap();

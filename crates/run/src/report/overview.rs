@@ -46,7 +46,13 @@ pub struct Overview<'a> {
 
 impl fmt::Display for Overview<'_> {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let [sampling, discretisation] = self.errors();
+        // The only cell, unless members are listed one by one.
+        let only = match &self.statistics.cells[..] {
+            [cell] if !self.spec.names_members() => Some(cell),
+            _ => None,
+        };
+        let of_only = |text: &dyn Fn(&CellStatistics) -> String| only.map_or(String::new(), text);
+        let [sampling, discretisation] = only.map_or_else(Default::default, |cell| errors(cell, self.spec));
         self.statuses(f)?;
         writeln!(f)?;
         match self.spec.names_members() {
@@ -58,18 +64,18 @@ impl fmt::Display for Overview<'_> {
             ("ensemble", shortened(&describe(self.spec), usize::MAX)),
             ("outlines", self.tally.supplement.mollified.outlines().unwrap_or_default()),
             ("rounding", self.tally.supplement.mollified.smoothing().unwrap_or_default()),
-            (self.statistics.time(), self.relaxation()),
-            ("t_relax", self.raw()),
+            (self.statistics.time(), of_only(&|cell| unit(self.spec) + &self.relaxed(cell))),
+            ("t_relax", of_only(&|cell| self.limits_of(cell).map_or(String::new(), |times| raw(times, self.spec)))),
             ("sampling", sampling),
             ("resolution", discretisation),
             ("nodes", self.tally.nodes.in_words().unwrap_or_default()),
             ("t_error", self.tally.nodes.bounds_in_words().unwrap_or_default()),
             ("accuracy", self.accuracy()),
-            ("rate", self.rate()),
-            ("t_vanish", self.vanishing()),
+            ("rate", of_only(&rate)),
+            ("t_vanish", of_only(&|cell| vanished(self.spec, cell).unwrap_or_default())),
         ]
         .into_iter()
-        .chain(self.events().into_iter().map(|text| ("event", text)))
+        .chain(only.into_iter().flat_map(|cell| events(self.spec, cell)).map(|text| ("event", text)))
         .chain([
             ("work", self.work()),
             ("ran on", machine(self.platform)),
@@ -98,18 +104,6 @@ impl Overview<'_> {
         writeln!(f, "{:<11}{members:>10}", "all")
     }
 
-    /// The only cell, unless members are listed one by one.
-    fn only_cell(&self) -> Option<&CellStatistics> {
-        match &self.statistics.cells[..] {
-            [cell] if !self.spec.names_members() => Some(cell),
-            _ => None,
-        }
-    }
-
-    fn relaxation(&self) -> String {
-        self.only_cell().map_or(String::new(), |cell| unit(self.spec) + &self.relaxed(cell))
-    }
-
     /// When the members of a cell relaxed, and which of them the table of statuses counts as vanished.
     fn relaxed(&self, cell: &CellStatistics) -> String {
         let later = cell.relaxed_before_vanishing();
@@ -124,22 +118,6 @@ impl Overview<'_> {
     /// The times of a cell of which limits are shown, if they are.
     fn limits_of<'b>(&self, cell: &'b CellStatistics) -> Option<&'b TimeStatistics> {
         Some(&cell.relaxing.times).filter(|_| self.statistics.of_limits)
-    }
-
-    /// When the members of a single ensemble vanished, if any did.
-    fn vanishing(&self) -> String {
-        self.only_cell().and_then(|cell| vanished(self.spec, cell)).unwrap_or_default()
-    }
-
-    /// What stands behind the limits of a single ensemble.
-    fn raw(&self) -> String {
-        let cell = self.only_cell().filter(|_| self.statistics.of_limits);
-        cell.map_or(String::new(), |cell| raw(&cell.relaxing.times, self.spec))
-    }
-
-    /// A line for each event of a single ensemble.
-    fn events(&self) -> Vec<String> {
-        self.only_cell().map_or(Vec::new(), |cell| events(self.spec, cell).collect())
     }
 
     /// Each member with its time, where they are few and known by name.
@@ -177,11 +155,6 @@ impl Overview<'_> {
         writeln!(f)
     }
 
-    /// What sampling and discretisation do to the times of a single ensemble.
-    fn errors(&self) -> [String; 2] {
-        self.only_cell().map_or_else(Default::default, |cell| errors(cell, self.spec))
-    }
-
     /// What `--accuracy` asked for, and what was reached in the cell that is farthest from it.
     fn accuracy(&self) -> String {
         // A shard has some of the members that it takes.
@@ -192,17 +165,6 @@ impl Overview<'_> {
         let what = if self.statistics.of_each { "each t_limit" } else { "the median" };
         let reached = rounded_beside(self.statistics.uncertainty(), goal);
         format!("the relative uncertainty of {what} is {reached} ({} requested)", number(goal))
-    }
-
-    /// The rates of a single ensemble; empty if no member has one.
-    fn rate(&self) -> String {
-        let Some(CellStatistics { rates: Rates { numbers, .. }, .. }) = self.only_cell() else { return String::new() };
-        let Some(median) = numbers.get("median") else { return String::new() };
-        let theory = numbers.get("ratio");
-        let theory =
-            theory.map_or(String::new(), |ratio| format!(", {} times that of linear theory", significant(ratio)));
-        let fits = count(numbers.known as u64, "fit");
-        format!("the median decay rate of the excess is {}{theory} ({fits})", significant(median))
     }
 
     /// One line per cell of a study, and how the cells compare.
@@ -290,6 +252,15 @@ impl Overview<'_> {
         let without = if self.spec.refine { "; runs at other resolutions are not counted" } else { "" };
         format!("each member took {}{solves_each} on average, {sweeps}{without}", of(*steps, "step"))
     }
+}
+
+/// The rates of a cell; empty if no member has one.
+fn rate(CellStatistics { rates: Rates { numbers, .. }, .. }: &CellStatistics) -> String {
+    let Some(median) = numbers.get("median") else { return String::new() };
+    let theory = numbers.get("ratio");
+    let theory = theory.map_or(String::new(), |ratio| format!(", {} times that of linear theory", significant(ratio)));
+    let fits = count(numbers.known as u64, "fit");
+    format!("the median decay rate of the excess is {}{theory} ({fits})", significant(median))
 }
 
 /// Where those of `all` rows are that are not listed, if there are any.

@@ -26,15 +26,8 @@ pub enum Progress {
     /// To a function, with the members, or runs of members, that have ended, all of them, and the share of the work
     /// that is done.
     Callback(Box<dyn FnMut(u64, u64, f64)>),
-    /// In a file or a pipe, with the start of the run.
-    Lines(Instant, ProgressLines, ProgressPace),
-}
-
-/// Lines at even times; none for a run that ends before the first.
-#[derive(Default)]
-pub struct ProgressLines {
-    /// Periods that had passed at the last line.
-    periods: u64,
+    /// In a file or a pipe, with the start of the run and the periods that had passed at the last line.
+    Lines(Instant, u64, ProgressPace),
 }
 
 /// How fast the work is done: since the first share that was shown, because a resumed run did that part earlier.
@@ -67,7 +60,7 @@ impl Progress {
         if quiet {
             return Progress::Quiet;
         }
-        let lines = || Progress::Lines(Instant::now(), ProgressLines::default(), ProgressPace::default());
+        let lines = || Progress::Lines(Instant::now(), 0, ProgressPace::default());
         if !io::stderr().is_terminal() {
             return lines();
         }
@@ -84,11 +77,11 @@ impl Progress {
             Progress::Quiet => {}
             Progress::Bar(bar, pace) => show_bar(bar, pace, &ended(done, total, what), share.clamp(0.0, 1.0)),
             Progress::Callback(tell) => tell(done, total, share),
-            Progress::Lines(began, lines, pace) => {
+            Progress::Lines(began, periods, pace) => {
                 let share = share.clamp(0.0, 1.0);
                 let left = pace.left(share);
-                if let Some(line) = lines.at(began.elapsed(), || line(&ended(done, total, what), share, left)) {
-                    let _ = writeln!(io::stderr().lock(), "{line}");
+                if is_due(periods, began.elapsed()) {
+                    let _ = writeln!(io::stderr().lock(), "{}", line(&ended(done, total, what), share, left));
                 }
             }
         }
@@ -114,14 +107,11 @@ impl Progress {
     }
 }
 
-impl ProgressLines {
-    /// The `line` due `elapsed` after the start of the run, if any.
-    fn at(&mut self, elapsed: Duration, line: impl FnOnce() -> String) -> Option<String> {
-        let periods = elapsed.as_secs() / PERIOD.as_secs();
-        let due = periods > self.periods;
-        self.periods = periods;
-        due.then(line)
-    }
+/// Whether a line is due `elapsed` after the start of the run, if so many `periods` had passed at the last look. Lines
+/// are at even times; a run that ends before the first has none.
+fn is_due(periods: &mut u64, elapsed: Duration) -> bool {
+    let now = elapsed.as_secs() / PERIOD.as_secs();
+    std::mem::replace(periods, now) < now
 }
 
 fn style(colour: bool) -> Result<ProgressStyle, TemplateError> {
@@ -189,14 +179,12 @@ mod tests {
 
     #[test]
     fn a_line_is_due_every_ten_seconds_and_not_before() {
-        let mut lines = ProgressLines::default();
-        let at = |lines: &mut ProgressLines, milliseconds| {
-            lines.at(Duration::from_millis(milliseconds), String::new).is_some()
-        };
-        let due: Vec<u64> = (0..60_000).step_by(70).filter(|elapsed| at(&mut lines, *elapsed)).collect();
+        let mut periods = 0;
+        let mut at = |milliseconds| is_due(&mut periods, Duration::from_millis(milliseconds));
+        let due: Vec<u64> = (0..60_000).step_by(70).filter(|elapsed| at(*elapsed)).collect();
         assert_eq!(due, [10_010, 20_020, 30_030, 40_040, 50_050]);
         // Long dispatches skip lines, which are not printed later.
-        let due: Vec<u64> = [95_000, 99_999, 100_000].into_iter().filter(|elapsed| at(&mut lines, *elapsed)).collect();
+        let due: Vec<u64> = [95_000, 99_999, 100_000].into_iter().filter(|elapsed| at(*elapsed)).collect();
         assert_eq!(due, [95_000, 100_000]);
     }
 

@@ -26,20 +26,13 @@ pub enum Cause {
 impl Cause {
     /// The error with which the run ends; `so_far` says what has been done.
     pub fn error(self, so_far: &str) -> Error {
-        let message = format!("stopped by {}{so_far}", self.name());
-        match self {
-            Cause::Interrupt => Error::Interrupted(message),
-            Cause::Terminate | Cause::Hangup | Cause::MaxTime => Error::Stopped(message),
-        }
-    }
-
-    fn name(self) -> &'static str {
-        match self {
-            Cause::Interrupt => "Ctrl-C",
-            Cause::Terminate => "SIGTERM",
-            Cause::Hangup => "SIGHUP",
-            Cause::MaxTime => "--max-time",
-        }
+        let (kind, name): (fn(String) -> Error, _) = match self {
+            Cause::Interrupt => (Error::Interrupted, "Ctrl-C"),
+            Cause::Terminate => (Error::Stopped, "SIGTERM"),
+            Cause::Hangup => (Error::Stopped, "SIGHUP"),
+            Cause::MaxTime => (Error::Stopped, "--max-time"),
+        };
+        kind(format!("stopped by {name}{so_far}"))
     }
 }
 

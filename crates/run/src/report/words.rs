@@ -202,19 +202,13 @@ pub fn member_time(member: &MemberTime) -> String {
     }
 }
 
-/// A number and its error.
-pub(super) fn with_error(t: f64, error: f64) -> String {
-    let (t, error) = beside(t, error);
-    format!("{t} ± {error}")
-}
-
 /// A number and its error: the error to two digits, the number to its last one, if that is possible without a power of
 /// ten.
-fn beside(t: f64, error: f64) -> (String, String) {
+pub(super) fn with_error(t: f64, error: f64) -> String {
     let digits = || usize::try_from(1 - error.log10().floor() as i32).ok().filter(|digits| *digits <= 12);
     match Some(()).filter(|()| error > 0.0 && (1e-4..1e6).contains(&t.abs())).and_then(|()| digits()) {
-        Some(digits) => (format!("{t:.digits$}"), format!("{error:.digits$}")),
-        None => (significant(t), rounded(error, 2)),
+        Some(digits) => format!("{t:.digits$} ± {error:.digits$}"),
+        None => format!("{} ± {}", significant(t), rounded(error, 2)),
     }
 }
 

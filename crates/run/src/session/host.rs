@@ -2,7 +2,6 @@
 
 use crate::report::{ReportOptions, ResultFormat, Stop};
 use curvelax_base::error::Result;
-use curvelax_ensemble::Snapshot;
 
 /// The caller of a run: a user at a command line, or a program.
 pub trait Host {
@@ -24,7 +23,4 @@ pub trait Host {
     fn may_continue(&self) -> Result<()> {
         Ok(())
     }
-    /// Sees snapshots of a member, in time order and before they are stored. Those that a resumed run has stored
-    /// earlier are not seen again.
-    fn see(&self, _snapshots: &[Snapshot]) {}
 }

@@ -1,13 +1,12 @@
 //! From a spec to a finished folder of results: what the command line and the Python package share.
 //!
-//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`RunPlan`] makes the choices that it leaves
-//! to rounds; a [`PlacedStudy`] is the checked plan, with a back end for each stage; a session carries it out and
+//! The way of a run: a request is a [`Spec`](curvelax_ensemble::Spec); a [`PlacedStudy`] is the checked plan, in which
+//! rounds have made the choices that it leaves to them, with a back end for each stage; a session carries it out and
 //! reports. [`begin`] starts a run, [`resume()`] continues one, and both end here: a run that loses a GPU that was not
 //! requested is resumed on the CPU.
 
 mod host;
 mod placed;
-mod plan;
 mod resume;
 mod run;
 
@@ -15,7 +14,6 @@ use std::path::Path;
 
 pub use host::Host;
 pub use placed::PlacedStudy;
-pub use plan::RunPlan;
 pub use resume::{Begun, ResumePlace, begun};
 pub use run::Completed;
 
@@ -46,7 +44,7 @@ pub fn begin(
 /// [`Error::Request`] if there is no run, or if it would continue elsewhere without being asked to; and those of the
 /// run.
 pub fn resume(path: &Path, place: ResumePlace, host: &dyn Host) -> Result<Option<Completed>> {
-    let resumed = Begun::open(path)?.resume(place, host)?;
+    let resumed = Begun::open(path)?.resume(place, None, host)?;
     resumed.map(|session| complete(session, host)).transpose()
 }
 
@@ -57,19 +55,21 @@ pub fn resume(path: &Path, place: ResumePlace, host: &dyn Host) -> Result<Option
 pub fn resume_like(begun: Begun, study: &Study, asked: BackendChoice, host: &dyn Host) -> Result<Option<Completed>> {
     begun.check_same(study, asked)?;
     let place = ResumePlace { threads: study.spec().threads, ..ResumePlace::default() };
-    begun.resume(place, host)?.map(|session| complete(session, host)).transpose()
+    begun.resume(place, None, host)?.map(|session| complete(session, host)).transpose()
 }
 
 /// Carries out `session`. If a GPU fails that `--backend auto` chose, the run continues on the CPU from its last
 /// checkpoint, as by `resume --backend cpu`.
 fn complete(session: Session, host: &dyn Host) -> Result<Completed> {
     let Session { placed, report, .. } = &session;
-    let (falls_back, path, stop) = (placed.may_fall_back(), report.folder().to_path_buf(), report.stop().clone());
+    let (falls_back, path, stop) =
+        (placed.may_fall_back(), report.folder.path().to_path_buf(), report.options.stop.clone());
     match session.carry_out(host) {
         Err(Error::Device(fault)) if falls_back => {
             let why = format!("the GPU failed: {fault}");
             host.say(&format!("note: on the CPU from here on: {why}"));
-            match Begun::open(&path)?.resume_on_cpu(why, host.options_with(stop), host)? {
+            let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
+            match Begun::open(&path)?.resume(place, Some(stop), host)? {
                 Some(session) => session.carry_out(host),
                 None => Err(Error::Device(fault)),
             }

@@ -1,15 +1,23 @@
-//! A study and where it is computed.
+//! What is to run, and where: a spec in which the rounds of `--accuracy` have made their choices, checked.
 
-use super::{host::Host, plan::RunPlan};
+use std::path::PathBuf;
+
+use super::host::Host;
+use crate::report::ReportOptions;
 use curvelax_backend::{Backend, DeviceKind};
 use curvelax_base::error::Result;
-use curvelax_ensemble::{Cell, Study};
-use curvelax_study::placement::{self, ChosenBackend, OpeningWatch, Platform};
+use curvelax_ensemble::{Cell, Outlines, Spec, Study, request::spec::BackendChoice};
+use curvelax_study::{
+    accuracy,
+    placement::{self, ChosenBackend, OpeningWatch, Platform},
+};
 
 /// A plan that this machine can carry out: the study, with the back end of each stage.
 pub struct PlacedStudy {
-    /// What it was made from.
-    plan: RunPlan,
+    /// The spec that it was made from.
+    planned: Spec,
+    /// The directory to which paths in the spec are relative; empty for the current one.
+    base: PathBuf,
     /// The resolved study, with everything that the choices decided.
     pub study: Study,
     /// The back ends of its stages, not yet opened.
@@ -27,15 +35,32 @@ pub(super) enum FirstBackend {
 }
 
 impl PlacedStudy {
-    /// Checks everything that can be wrong with `plan` on this machine, and chooses where it is computed.
+    /// Plans `request`: replaces `accuracy` by the nodes, tolerance and members that reach it, found in rounds that
+    /// `options` may stop; and checks everything that can be wrong with it on this machine.
     ///
     /// # Errors
-    /// [`Error::Request`](curvelax_base::error::Error::Request) for what is wrong.
-    pub fn of(plan: RunPlan) -> Result<PlacedStudy> {
-        let mut study = Study::new_from(plan.spec.clone(), &plan.base, &plan.known)?;
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if it cannot be reached, and for what is wrong;
+    /// [`Error::Interrupted`](curvelax_base::error::Error::Interrupted) or
+    /// [`Error::Stopped`](curvelax_base::error::Error::Stopped) if asked to stop.
+    pub fn plan(request: Spec, options: Option<&ReportOptions>, host: &dyn Host) -> Result<PlacedStudy> {
+        let stopped = || {
+            if let Err(error) = host.may_continue() {
+                return Some(error);
+            }
+            let (cause, _) = options?.stop.asked()?;
+            Some(cause.error(" in the rounds of --accuracy, before the run began: nothing is saved"))
+        };
+        let spec = accuracy::plan(request, |round| host.say(&round.to_string()), stopped)?;
+        PlacedStudy::of(spec, PathBuf::new(), &Outlines::default())
+    }
+
+    /// Checks a planned spec, whose paths are relative to `base`, and chooses where it is computed. The outlines that
+    /// are `known` are not read again.
+    pub(super) fn of(planned: Spec, base: PathBuf, known: &Outlines) -> Result<PlacedStudy> {
+        let mut study = Study::new_from(planned.clone(), &base, known)?;
         let choices = placement::choose_all(&study)?;
         placement::settle(&mut study, &choices);
-        Ok(PlacedStudy { plan, study, choices })
+        Ok(PlacedStudy { planned, base, study, choices })
     }
 
     /// Replaces the reason of the choices.
@@ -51,7 +76,9 @@ impl PlacedStudy {
         let (backend, platform) = open(cells, choice, host)?;
         if choice.device().kind() != platform.backend {
             host.say(&format!("note: on the CPU instead: {}", platform.reason));
-            let on_cpu = PlacedStudy::of(self.plan.on_cpu(self.study.outlines().clone()))?;
+            // Its precision and tolerance may differ.
+            let spec = Spec { backend: BackendChoice::Cpu, adapter: None, ..self.planned };
+            let on_cpu = PlacedStudy::of(spec, self.base, self.study.outlines())?;
             return Ok((on_cpu.because(&platform.reason), FirstBackend::Announced));
         }
         let first = match platform.backend {

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{host::Host, placed::PlacedStudy, plan::RunPlan, run::Session};
-use crate::report::ReportOptions;
+use super::{host::Host, placed::PlacedStudy, run::Session};
+use crate::report::Stop;
 use curvelax_base::{
     error::{Error, Result},
     text::quoted,
@@ -92,60 +92,43 @@ impl Begun {
         Ok(())
     }
 
-    /// The session that continues the run; `None` if it is finished.
-    pub(super) fn resume(self, place: ResumePlace, host: &dyn Host) -> Result<Option<Session>> {
-        let Begun { folder, saved } = self;
-        let Some(saved) = saved else {
+    /// The session that continues the run from its checkpoint, by the means to `stop` it that there are already, or by
+    /// new ones of the host; `None` if it is finished.
+    pub(super) fn resume(self, place: ResumePlace, stop: Option<Stop>, host: &dyn Host) -> Result<Option<Session>> {
+        let Begun { mut folder, saved } = self;
+        let Some(mut saved) = saved else {
             folder.tidy()?;
             host.say(&format!("note: the run in {} is finished: nothing is left to do", folder.path().display()));
             return Ok(None);
         };
         // Before a device is looked for, which takes time.
-        let options = host.options()?;
-        continued(folder, saved, place, options, host).map(Some)
+        let options = stop.map_or_else(|| host.options(), |stop| Ok(host.options_with(stop)))?;
+        let path = folder.path().to_path_buf();
+        let warn = |fault: &str| host.say(&format!("warning: {}: {fault}", path.display()));
+        saved.note.iter().for_each(|fault| warn(fault));
+        let origin = &mut saved.head.origin;
+        let base = PathBuf::from(&origin.base);
+        let known = outlines::find(&folder, origin).unwrap_or_else(|fault| {
+            warn(&fault);
+            Outlines::default()
+        });
+        if known.is_empty() && !origin.outlines.is_empty() {
+            folder.make_absolute()?;
+            check_base(&base)?;
+        }
+        let placed = spec(&origin.spec, &place)
+            .and_then(|spec| PlacedStudy::of(spec, base, &known))
+            .map_err(|error| origin.explain(error))?;
+        let placed = match &place {
+            ResumePlace { why: Some(_), .. } => placed.because("the GPU failed"),
+            // The spec of a run names its back end even if the user did not.
+            ResumePlace { backend: None, adapter: None, .. } => placed.because(&origin.platform.reason),
+            _ => placed,
+        };
+        origin.check_outlines(&placed.study)?;
+        settle(origin, &placed, place)?;
+        Session::resume(placed, folder, saved, options, host).map(Some)
     }
-
-    /// The session that continues the run on the CPU, because of `why`; `None` if it is finished.
-    pub(super) fn resume_on_cpu(self, why: String, options: ReportOptions, host: &dyn Host) -> Result<Option<Session>> {
-        let Begun { folder, saved: Some(saved) } = self else { return Ok(None) };
-        let place = ResumePlace { backend: Some(BackendChoice::Cpu), why: Some(why), ..ResumePlace::default() };
-        continued(folder, saved, place, options, host).map(Some)
-    }
-}
-
-/// The session that continues the run in `folder` from a checkpoint.
-fn continued(
-    mut folder: OutputFolder,
-    mut saved: Saved,
-    place: ResumePlace,
-    options: ReportOptions,
-    host: &dyn Host,
-) -> Result<Session> {
-    let path = folder.path().to_path_buf();
-    let warn = |fault: &str| host.say(&format!("warning: {}: {fault}", path.display()));
-    saved.note.iter().for_each(|fault| warn(fault));
-    let origin = &mut saved.head.origin;
-    let base = PathBuf::from(&origin.base);
-    let known = outlines::find(&folder, origin).unwrap_or_else(|fault| {
-        warn(&fault);
-        Outlines::default()
-    });
-    if known.is_empty() && !origin.outlines.is_empty() {
-        folder.make_absolute()?;
-        check_base(&base)?;
-    }
-    let placed = spec(&origin.spec, &place)
-        .and_then(|spec| PlacedStudy::of(RunPlan { spec, base, known }))
-        .map_err(|error| origin.explain(error))?;
-    let placed = match &place {
-        ResumePlace { why: Some(_), .. } => placed.because("the GPU failed"),
-        // The spec of a run names its back end even if the user did not.
-        ResumePlace { backend: None, adapter: None, .. } => placed.because(&origin.platform.reason),
-        _ => placed,
-    };
-    origin.check_outlines(&placed.study)?;
-    settle(origin, &placed, place)?;
-    Session::resume(placed, folder, saved, options, host)
 }
 
 /// Writes to the origin of a run where it continues.

@@ -1,6 +1,6 @@
 //! A session: a study that is being carried out, from its beginning or from a checkpoint to its end or an interruption.
 
-use std::path::{Path, PathBuf};
+use std::{mem, path::Path};
 
 use super::{
     host::Host,
@@ -11,9 +11,7 @@ use curvelax_base::{
     error::{Error, Result},
     text::quoted,
 };
-use curvelax_ensemble::{
-    Ended, Extent, LevelRow, LevelSink, RunProgress, SeriesRow, Sink, SinkRequest, Snapshot, Study, simulate,
-};
+use curvelax_ensemble::{LevelSink, RunProgress, Study, simulate};
 use curvelax_files::{
     OutputFolder,
     state::checkpoint::{Origin, Saved},
@@ -27,8 +25,6 @@ pub struct Completed {
     pub text: String,
     /// How it ended as a whole.
     pub verdict: RunVerdict,
-    /// Folder of the results.
-    pub out: PathBuf,
 }
 
 /// A study that is being carried out.
@@ -63,7 +59,7 @@ impl Session {
         host: &dyn Host,
     ) -> Result<Session> {
         let (report, progress) = RunReport::resume(folder, &placed.study, saved, options)?;
-        let (members, all) = (report.members(), placed.study.member_count());
+        let (members, all) = (report.tally.members(), placed.study.member_count());
         host.say(&format!("resuming: {members} of {all} members finished"));
         Ok(Session { placed, first: FirstBackend::Unopened, report, progress })
     }
@@ -75,18 +71,18 @@ impl Session {
     /// Those of the run, and [`Error::Request`] if the progress does not match the report.
     pub fn carry_out(self, host: &dyn Host) -> Result<Completed> {
         self.check_rows()?;
-        let early = [&self.placed.warnings()[..], self.report.moves()].concat();
+        let early = [&self.placed.warnings()[..], &self.report.origin.moves].concat();
         early.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
-        let (out, falls_back) = (self.report.folder().to_path_buf(), self.placed.may_fall_back());
+        let (out, falls_back) = (self.report.folder.path().to_path_buf(), self.placed.may_fall_back());
         let Session { placed: PlacedStudy { study, choices, .. }, first, mut report, progress } = self;
         if let Err(error) = advance(&study, choices, first, progress, &mut report, host) {
             return Err(ended(report, error, falls_back, &out, host));
         }
-        let late = report.warnings();
+        let late = report.tally.warnings();
         let (text, verdict) =
             report.finish(study.spec(), &early, host.form()).inspect_err(|error| kept(&out, error, host))?;
         late.iter().for_each(|warning| host.say(&format!("warning: {warning}")));
-        Ok(Completed { text, verdict, out })
+        Ok(Completed { text, verdict })
     }
 
     /// Checks that the checkpoint counts as many members as have rows.
@@ -95,14 +91,14 @@ impl Session {
         if told == rows {
             return Ok(());
         }
-        let path = self.report.folder().display();
+        let path = self.report.folder.path().display();
         Err(Error::Request(format!("{path}: the checkpoint counts {told} members, but the table has {rows}")))
     }
 }
 
 /// Closes the report of a run that ended with `error`, and returns its cause.
 fn ended(report: RunReport, error: Error, falls_back: bool, out: &Path, host: &dyn Host) -> Error {
-    let error = report.explain(error);
+    let error = report.folder.explain(error);
     if falls_back && matches!(error, Error::Device(_)) {
         report.leave();
     } else if report.give_up() {
@@ -129,15 +125,15 @@ fn advance(
     report: &mut RunReport,
     host: &dyn Host,
 ) -> Result<()> {
-    let (own, mut first, mut levels) = (study.own_stage(), Some(first), report.take_levels());
-    for (i, (stage, choice)) in study.stages().iter().zip(choices).enumerate().skip(report.stage()) {
+    let (own, mut first, mut levels) = (study.own_stage(), Some(first), mem::take(&mut report.levels));
+    for (i, (stage, choice)) in study.stages().iter().zip(choices).enumerate().skip(report.stage) {
         let cells = study.cells_of(stage, &levels)?;
         // No member needs these nodes.
         if cells.is_empty() {
             continue;
         }
         // A run that has begun stays on its device.
-        let choice = choice.after(report.platform());
+        let choice = choice.after(&report.origin.platform);
         let precision = choice.precision();
         let mut backend = match first.take_if(|_| i == own) {
             Some(FirstBackend::Open(backend)) => backend,
@@ -147,45 +143,9 @@ fn advance(
             _ => open(&cells, &choice, host)?.0,
         };
         report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());
-        let progress = std::mem::take(&mut progress);
-        let mut shown = Shown { report, host };
-        let mut sink =
-            LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: &mut shown };
+        let progress = mem::take(&mut progress);
+        let mut sink = LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink: report };
         simulate::resume(&cells, precision, backend.as_mut(), study.portraits(stage), progress, &mut sink)?;
     }
     Ok(())
-}
-
-/// The report of a run whose host sees the snapshots.
-struct Shown<'a> {
-    report: &'a mut RunReport,
-    host: &'a dyn Host,
-}
-
-impl Sink for Shown<'_> {
-    fn member(&mut self, ended: &Ended) -> Result<()> {
-        self.host.see(&ended.rows.snapshots);
-        self.report.member(ended)
-    }
-
-    fn level(&mut self, row: &LevelRow) -> Result<()> {
-        self.report.level(row)
-    }
-
-    fn spill(&mut self, series: &[SeriesRow], snapshots: &[Snapshot]) -> Result<Option<Extent>> {
-        self.host.see(snapshots);
-        self.report.spill(series, snapshots)
-    }
-
-    fn progress(&mut self, done: u64, total: u64, share: f64) -> Result<()> {
-        self.report.progress(done, total, share)
-    }
-
-    fn next_request(&mut self) -> SinkRequest {
-        self.report.next_request()
-    }
-
-    fn checkpoint(&mut self, progress: &RunProgress) -> Result<()> {
-        self.report.checkpoint(progress)
-    }
 }

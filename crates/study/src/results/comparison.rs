@@ -9,6 +9,8 @@
 
 use std::{cmp::Ordering, ops::Range};
 
+use serde::Serialize;
+
 use super::tally::{CellTally, EventTally, Tally};
 use curvelax_base::error::Result;
 use curvelax_ensemble::Spec;
@@ -55,12 +57,12 @@ pub struct CellDifference {
 }
 
 /// Pairs of which a member did not relax.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LeftOut {
-    /// This cell's member had not relaxed when the other had.
-    pub later: usize,
     /// The other member had not relaxed when this cell's had.
     pub earlier: usize,
+    /// This cell's member had not relaxed when the other had.
+    pub later: usize,
     /// Which one relaxes first is not known.
     pub unknown: usize,
 }

@@ -107,7 +107,10 @@ impl Movie {
     pub fn new(films: &[Film], spec: &Spec, cut: &MovieOptions, t_limit: impl Fn(u64) -> Option<f64>) -> Option<Movie> {
         let shown = if spec.sweep.is_empty() { films.len().min(cut.members) } else { films.len() };
         let films: Vec<&Film> = spread(shown, cut.members).map(|i| &films[i]).collect();
-        let states: Vec<Vec<Vec<DVec2>>> = films.iter().map(|film| drawable(film)).collect();
+        // None if they are not curves.
+        let drawable = |states: &Vec<Vec<DVec2>>| states.first().is_some_and(|nodes| nodes.len() > 2);
+        let states: Vec<Vec<Vec<DVec2>>> =
+            films.iter().map(|film| Some(film.frames()).filter(drawable).unwrap_or_default()).collect();
         let boxes: Vec<Option<(DVec2, DVec2)>> =
             states.iter().map(|states| polygon::bounds(states.iter().flatten().copied())).collect();
         let known: Vec<(DVec2, DVec2)> = boxes.iter().flatten().copied().collect();
@@ -227,15 +230,6 @@ const GREY: &str = "grey: start";
 fn power_of(value: f64) -> i32 {
     // Exact, which a logarithm is not on every machine.
     format!("{value:e}").split_once('e').and_then(|(_, power)| power.parse().ok()).unwrap_or(0)
-}
-
-/// The states of a film; none if they are not curves.
-fn drawable(film: &Film) -> Vec<Vec<DVec2>> {
-    let states = film.frames();
-    match states.first().is_some_and(|nodes| nodes.len() > 2) {
-        true => states,
-        false => Vec::new(),
-    }
 }
 
 #[cfg(test)]

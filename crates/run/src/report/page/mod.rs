@@ -8,8 +8,6 @@
 mod player;
 mod scope;
 
-use std::fmt::Write;
-
 pub use player::{MAX_MEMBERS, MovingMember, spread};
 
 use curvelax_base::text::{count, grouped};
@@ -123,17 +121,14 @@ impl Page<'_> {
         let mut sheets = Sheets::default();
         let plots = self.pictures(&mut sheets);
         let tables: String = self.tables.iter().map(PageTable::html).collect();
-        let spec = if self.spec.is_empty() {
-            String::new()
-        } else {
-            format!("<pre><code>{}</code></pre>\n", escape(self.spec))
-        };
-        let facts = self.facts();
+        let spec = format!("<pre><code>{}</code></pre>\n", escape(self.spec));
+        let fact = |(name, value): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
+        let facts: String = self.provenance.iter().map(fact).collect();
         let sections = [
             ("plots", "Plots", plots),
             ("tables", "Tables", tables),
             ("spec", "Spec", spec),
-            ("provenance", "Provenance", facts),
+            ("provenance", "Provenance", format!("<dl class=\"facts\">\n{facts}</dl>\n")),
         ];
         let sections: Vec<_> = sections.into_iter().filter(|(.., content)| !content.is_empty()).collect();
 
@@ -255,14 +250,6 @@ impl Page<'_> {
             },
         )
     }
-
-    fn facts(&self) -> String {
-        if self.provenance.is_empty() {
-            return String::new();
-        }
-        let fact = |(name, value): &(String, String)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value));
-        format!("<dl class=\"facts\">\n{}</dl>\n", self.provenance.iter().map(fact).collect::<String>())
-    }
 }
 
 impl Headline {
@@ -305,40 +292,29 @@ impl PageTable {
     }
 
     fn html(&self) -> String {
-        let table = match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
-            true => self.turned(),
-            false => self.upright(),
+        let (class, rows) = match self.rows.len() <= FEW_ROWS && self.header.len() > NARROW {
+            true => ("table turned", self.turned()),
+            false => ("table", self.upright()),
         };
-        match self.rows.len() > UNFOLDED {
-            true => {
-                let (caption, rows) = (escape(&self.caption), grouped(self.rows.len() as u64));
-                format!("<details>\n<summary>{caption} ({rows} rows)</summary>\n{table}</details>\n")
-            }
-            false => table,
-        }
-    }
-
-    /// What stands before its rows.
-    fn begin(&self, class: &str) -> String {
-        let (caption, note) = (escape(&self.caption), paragraph("small", &self.note));
-        format!(
+        let (caption, note, link) = (escape(&self.caption), paragraph("small", &self.note), self.link());
+        let table = format!(
             "<div class=\"{class}\" role=\"region\" aria-label=\"{caption}\" tabindex=\"0\">\n\
-             <p class=\"title\">{caption}</p>\n{note}<table>\n"
-        )
+             <p class=\"title\">{caption}</p>\n{note}<table>\n{rows}</tbody>\n</table>\n{link}</div>\n"
+        );
+        if self.rows.len() <= UNFOLDED {
+            return table;
+        }
+        let count = grouped(self.rows.len() as u64);
+        format!("<details>\n<summary>{caption} ({count} rows)</summary>\n{table}</details>\n")
     }
 
     /// A row for each column, and a column for each row.
     fn turned(&self) -> String {
-        let mut html = self.begin("table turned") + "<tbody>\n";
-        for (j, name) in self.header.iter().enumerate() {
-            let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(name));
-            for row in &self.rows {
-                // Writing into a string cannot fail.
-                let _ = write!(html, "<td class=\"number\">{}</td>", escape(row.get(j).map_or("", String::as_str)));
-            }
-            html += "</tr>\n";
-        }
-        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
+        let row = |(j, name): (usize, &String)| {
+            let cells = self.rows.iter().map(|row| format!("<td class=\"number\">{}</td>", cell(row, j)));
+            format!("<tr><th scope=\"row\">{}</th>{}</tr>\n", escape(name), cells.collect::<String>())
+        };
+        "<tbody>\n".to_string() + &self.header.iter().enumerate().map(row).collect::<String>()
     }
 
     /// Where all rows are, with all digits.
@@ -357,31 +333,29 @@ impl PageTable {
 
     fn upright(&self) -> String {
         let columns = self.header.len();
-        let cell = |row: &[String], j: usize| escape(row.get(j).map_or("", String::as_str));
         let is_number = |text: &str| text.is_empty() || number(text);
         let numbers: Vec<bool> =
             (0..columns).map(|j| self.rows.iter().all(|row| row.get(j).is_none_or(|text| is_number(text)))).collect();
-        let class = |j: usize| if numbers[j] { " class=\"number\"" } else { "" };
-
-        let mut html = self.begin("table") + "<thead><tr>";
-        for j in 0..columns {
-            let _ = write!(html, "<th scope=\"col\"{}>{}</th>", class(j), cell(&self.header, j));
-        }
-        html += "</tr></thead>\n<tbody>\n";
-        for row in self.rows.iter().take(MAX_ROWS) {
-            html += "<tr>";
-            for j in 0..columns {
-                let (class, cell) = (class(j), cell(row, j));
-                // Writing into a string cannot fail.
-                let _ = match j {
-                    0 => write!(html, "<th scope=\"row\"{class}>{cell}</th>"),
-                    _ => write!(html, "<td{class}>{cell}</td>"),
-                };
-            }
-            html += "</tr>\n";
-        }
-        html + "</tbody>\n</table>\n" + &self.link() + "</div>\n"
+        let of = |row: &[String], j: usize, tag: &str, scope: &str| {
+            let class = if numbers[j] { " class=\"number\"" } else { "" };
+            format!("<{tag}{scope}{class}>{}</{tag}>", cell(row, j))
+        };
+        let head: String = (0..columns).map(|j| of(&self.header, j, "th", " scope=\"col\"")).collect();
+        let row = |row: &Vec<String>| {
+            let cells = (0..columns).map(|j| match j {
+                0 => of(row, j, "th", " scope=\"row\""),
+                _ => of(row, j, "td", ""),
+            });
+            format!("<tr>{}</tr>\n", cells.collect::<String>())
+        };
+        let rows: String = self.rows.iter().take(MAX_ROWS).map(row).collect();
+        format!("<thead><tr>{head}</tr></thead>\n<tbody>\n{rows}")
     }
+}
+
+/// The text of a cell; none where a row is short.
+fn cell(row: &[String], j: usize) -> String {
+    escape(row.get(j).map_or("", String::as_str))
 }
 
 /// Whether a cell is a number: plain, with a power of ten, or a bound.

@@ -3,8 +3,6 @@
 //! All members share one scale if they can be seen at it. A coordinate is an integer below 4096, written as two digits
 //! of base64. The script `page.js` reads them and moves the nodes on straight lines from one time to the next.
 
-use std::fmt::Write as _;
-
 use glam::DVec2;
 
 use crate::report::members_layout::PanelLayout;
@@ -85,6 +83,8 @@ impl Player {
     pub fn new(trajectories: &[MovingMember], units: &[String; 2]) -> Option<Player> {
         let shown = trajectories.iter().map(|trajectory| (trajectory, trajectory.frames()));
         let shown: Vec<_> = shown.filter(|(_, frames)| !frames.is_empty()).take(MAX_MEMBERS).collect();
+        let bounds =
+            |frames: &[(f64, Vec<DVec2>)]| polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes).copied());
         let boxes: Vec<(DVec2, DVec2)> = shown.iter().filter_map(|(_, frames)| bounds(frames)).collect();
         if boxes.is_empty() {
             return None;
@@ -114,23 +114,21 @@ impl Player {
 
     /// Its part of the page. Without the script it shows the members at their first time.
     pub fn html(&self) -> String {
-        let mut html = String::from("<div class=\"members\">\n");
-        for PlayedMember { label, status, frames, times } in &self.members {
+        let member = |PlayedMember { label, status, frames, times }: &PlayedMember| {
+            debug_assert_eq!(frames.len(), times.len());
             let (start, label) = (path(&frames[0]), escape(label));
             let dots = if frames[0].len() <= 2 * MAX_DOTS { dots(&frames[0]) } else { String::new() };
             let (height, colour) = (self.height, colour(status));
-            // Writing into a string cannot fail.
-            let _ = writeln!(
-                html,
+            format!(
                 "<figure style=\"--now: var(--{colour})\">\
                  <svg viewBox=\"0 0 {LARGEST} {height}\" role=\"img\" aria-label=\"{label}\">\
                  <path class=\"start\" d=\"{start}\"/><path class=\"now\" d=\"{start}\"/>\
-                 <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>",
+                 <path class=\"nodes\" d=\"{dots}\"/>{}</svg><figcaption>{label}</figcaption></figure>\n",
                 self.scale_bar()
-            );
-            debug_assert_eq!(frames.len(), times.len());
-        }
-        html += "</div>\n";
+            )
+        };
+        let members: String = self.members.iter().map(member).collect();
+        let mut html = format!("<div class=\"members\">\n{members}</div>\n");
         if self.moves() {
             let unit = escape(&self.units[1]);
             html += &format!(
@@ -190,10 +188,6 @@ impl Player {
 pub fn spread(count: usize, most: usize) -> impl Iterator<Item = usize> {
     let shown = count.min(most);
     (0..shown).map(move |i| if shown > 1 { i * (count - 1) / (shown - 1) } else { 0 })
-}
-
-fn bounds(frames: &[(f64, Vec<DVec2>)]) -> Option<(DVec2, DVec2)> {
-    polygon::bounds(frames.iter().flat_map(|(_, nodes)| nodes.iter().copied()))
 }
 
 fn path(frame: &[u16]) -> String {

@@ -81,15 +81,15 @@ impl FinishedRun<'_> {
         });
         let others: Vec<(&str, u64)> = others.filter(|(_, without)| *without > 0).collect();
         let median = if let [cell] = &cells[..] { median(self.statistics.times(cell)) } else { None };
-        let text = self.text(medium, "Relaxation times", &self.error(), key);
-        let (title, quantity) = (text.title.clone(), self.statistics.time());
+        let (title, quantity) = ("Relaxation times", self.statistics.time());
+        let text = self.text(medium, title, &self.error(), key);
         let svg = RelaxationTimes { text, cells: times.collect(), others: &others, median }.draw(medium);
         let of_cells = if self.statistics.cells.len() > 1 { " of each cell" } else { "" };
         let caption = format!(
             "Above: how many members{of_cells} relaxed at which {quantity}. Below: the share of them that had relaxed by \
              then."
         );
-        figure(names::RELAXATION, &title, &caption, svg)
+        figure(names::RELAXATION, title, &caption, svg)
     }
 
     /// The times of each cell as a box, and their quantiles against those of two laws.
@@ -115,7 +115,7 @@ impl FinishedRun<'_> {
         let curves = self.statistics.cells.iter().map(|cell| survival_curve(&self.statistics.times(cell).sample));
         let text = self.text(medium, "Members not yet relaxed", &self.error(), key);
         let survival = Survival { text, curves: curves.collect(), ..Survival::default() };
-        survival_chart(names::SURVIVAL, &survival, medium)
+        survival_chart(names::SURVIVAL, &survival, medium, "", "it relaxed")
     }
 
     /// The members not yet relaxed, by group of their outlines.
@@ -140,7 +140,7 @@ impl FinishedRun<'_> {
         let key = CellKey { labels, ..CellKey::from(key) };
         let text = self.text(medium, &title, &joined([self.error(), some]), &key);
         let survival = Survival { text, curves, ..Survival::default() };
-        Some(survival_chart(names::GROUP_SURVIVAL, &survival, medium))
+        Some(survival_chart(names::GROUP_SURVIVAL, &survival, medium, "", "it relaxed"))
     }
 
     /// The name of a group or an event of a cell in a legend.
@@ -176,11 +176,8 @@ impl FinishedRun<'_> {
             _ => "No event has statistics, as members were stopped before it when they relaxed.",
         };
         let survival = Survival { text, share: "share without the event", none, curves };
-        let caption = format!(
-            "Share of the members in which an event has not happened yet. {}",
-            survival_caption(&survival, "that")
-        );
-        Some(figure(names::EVENT_SURVIVAL, &survival.text.title, &caption, survival.draw(medium)))
+        let share = "Share of the members in which an event has not happened yet. ";
+        Some(survival_chart(names::EVENT_SURVIVAL, &survival, medium, share, "that"))
     }
 
     /// The mean excess, for as long as all members of a cell are running.
@@ -249,42 +246,38 @@ impl FinishedRun<'_> {
         let axes = self.spec().sweep.axes();
         let across = self.two_axes().map_or(axes.len().checked_sub(1)?, |[colour, _]| colour);
         let axis = &axes[across];
-        let labels = axis.labels();
-        let place = |cell: &CellStatistics| labels.iter().position(|label| *label == cell.values[across]);
-        let others = |cell: &CellStatistics| -> Vec<String> {
-            cell.values.iter().enumerate().filter(|(i, _)| *i != across).map(|(_, value)| value.clone()).collect()
+        let keys: Vec<(usize, &SweepAxis)> = axes.iter().enumerate().filter(|(i, _)| *i != across).collect();
+        let label = |cell: &CellStatistics| {
+            let distinct = keys.iter().filter(|(_, key)| key.values.len() > 1);
+            distinct.map(|(i, key)| format!("{} = {}", key.key, cell.values[*i])).collect::<Vec<_>>().join(", ")
         };
-        let mut groups: Vec<(Vec<String>, Vec<&CellStatistics>)> = Vec::new();
+        let mut groups: Vec<(String, Vec<&CellStatistics>)> = Vec::new();
         for cell in &self.statistics.cells {
-            let own = others(cell);
-            match groups.iter_mut().find(|(values, _)| *values == own) {
+            let own = label(cell);
+            match groups.iter_mut().find(|(label, _)| *label == own) {
                 Some((_, cells)) => cells.push(cell),
                 None => groups.push((own, vec![cell])),
             }
         }
-        let keys: Vec<&SweepAxis> =
-            axes.iter().enumerate().filter(|(i, _)| *i != across).map(|(_, axis)| axis).collect();
-        let numbers = axis.numbers();
+        let has_numbers = axis.numbers().is_some();
         let level = |cell: &&CellStatistics| DependencePoint {
-            at: match (&numbers, place(cell)) {
-                (Some(numbers), Some(place)) => Setting::Number(numbers[place]),
+            at: match cell.values[across].parse() {
+                Ok(number) if has_numbers => Setting::Number(number),
                 _ => Setting::Name(cell.values[across].clone()),
             },
             median: median(self.statistics.times(cell)),
             quartiles: quartiles(self.statistics.times(cell)),
         };
-        let label = |values: &[String]| {
-            let distinct = keys.iter().zip(values).filter(|(key, _)| key.values.len() > 1);
-            distinct.map(|(key, value)| format!("{} = {value}", key.key)).collect::<Vec<_>>().join(", ")
-        };
-        let labels: Vec<String> = groups.iter().map(|(values, _)| label(values)).collect();
+        let labels: Vec<String> = groups.iter().map(|(label, _)| label.clone()).collect();
         let values = match keys[..] {
-            [key] => groups.iter().map(|(values, _)| value_of(key, values)).collect(),
+            [(i, key)] if key.numbers().is_some() => {
+                groups.iter().map(|(_, cells)| cells[0].values[i].parse().ok()).collect()
+            }
             _ => None,
         };
         let series = groups.iter().map(|(_, cells)| {
             let mut levels: Vec<DependencePoint> = cells.iter().map(level).collect();
-            if numbers.is_some() {
+            if has_numbers {
                 let place = |level: &DependencePoint| if let Setting::Number(x) = level.at { x } else { 0.0 };
                 levels.sort_by(|a, b| place(a).total_cmp(&place(b)));
             }
@@ -292,7 +285,7 @@ impl FinishedRun<'_> {
         });
         let series: Vec<Series> = series.collect();
         let title = format!("Relaxation time against {}", axis.key);
-        let name = keys.iter().map(|key| key.key.as_str()).collect::<Vec<_>>().join(", ");
+        let name = keys.iter().map(|(_, key)| key.key.as_str()).collect::<Vec<_>>().join(", ");
         // Colours are those of the key across: the series have dashes and markers.
         let crossed = self.two_axes().map(|_| Crossed {
             colours: Vec::new(),
@@ -431,19 +424,16 @@ fn joined(parts: [String; 2]) -> String {
     parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
-/// Survival curves of relaxation times.
-fn survival_chart(name: &'static str, drawn: &Survival, medium: Medium) -> PageFigure {
-    figure(name, &drawn.text.title, &survival_caption(drawn, "it relaxed"), drawn.draw(medium))
-}
-
-/// What a survival curve is, as far as it is drawn; a stroke is a member that ended before `what`.
-fn survival_caption(drawn: &Survival, what: &str) -> String {
+/// Survival curves. The caption says, after `share`, what a curve is, as far as it is drawn; a stroke is a member that
+/// ended before `what`.
+fn survival_chart(name: &'static str, drawn: &Survival, medium: Medium, share: &str, what: &str) -> PageFigure {
     let band = if drawn.has_bands() { " with Greenwood's 95 % band" } else { "" };
     let stroke = match drawn.has_strokes() {
         true => format!("; a stroke marks a member that ended before {what}"),
         false => String::new(),
     };
-    format!("Kaplan-Meier estimate{band}{stroke}.")
+    let caption = format!("{share}Kaplan-Meier estimate{band}{stroke}.");
+    figure(name, &drawn.text.title, &caption, drawn.draw(medium))
 }
 
 /// How much a feature explains in a cell.
@@ -517,9 +507,4 @@ fn median(of: &TimeStatistics) -> Option<EstimatedNumber> {
 fn quartiles(of: &TimeStatistics) -> (Option<f64>, Option<f64>) {
     let [_, lower, _, upper, _] = of.quantiles;
     (lower, upper)
-}
-
-/// The value among `values` of a key with numeric values.
-fn value_of(axis: &SweepAxis, values: &[String]) -> Option<f64> {
-    axis.numbers().and_then(|_| values.first()?.parse().ok())
 }
