@@ -355,7 +355,8 @@ proptest! {
             prop_assert!(mean.value <= sample.last().unwrap() + 1e-12);
         }
         prop_assert_eq!(curve.mean().is_none(), sample.events() == 0);
-        prop_assert_eq!(curve.caveat().is_none(), sample.events() > 1 && before == 0.0);
+        let whole = curve.mean().is_some_and(|mean| mean.restricted_to.is_none() && mean.standard_error.is_some());
+        prop_assert_eq!(whole, sample.events() > 1 && before == 0.0);
         for p in LEVELS {
             let found = interval::of_sample(&sample, p);
             prop_assert!(found.is_some() || sample.len() < 2 || p != 0.5);

@@ -26,8 +26,8 @@
 //!
 //! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`interval`] and [`log_rank`] read it and cannot fail. A
 //! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. Unknown values are
-//! `None`, never NaN and never infinite, and [`Caveat`] says why. Times may be in any one unit; means, deviations and
-//! quantiles have the same unit, variances of S have none.
+//! `None`, never NaN and never infinite. Times may be in any one unit; means, deviations and quantiles have the same
+//! unit, variances of S have none.
 
 //!
 //! # Example
@@ -41,7 +41,6 @@
 //! let curve = KaplanMeier::new(&sample);
 //! assert_eq!((curve.median(), curve.quantile(0.95)), (Some(0.9), None));
 //! assert_eq!(curve.mean().unwrap().restricted_to, Some(2.0));
-//! println!("{}", curve.caveat().unwrap());
 //! let interval = interval::of_sample(&sample, 0.5).unwrap();
 //! assert_eq!((interval.lower, interval.upper), (Some(0.5), None));
 //! # Ok::<(), curvelax_base::Error>(())
@@ -71,7 +70,7 @@ pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};
 pub use spread::Spread;
-pub use survival::{Caveat, KaplanMeier, Mean, Step};
+pub use survival::{KaplanMeier, Mean, Step};
 
 /// Standard errors in half a 95 % interval of a normal estimate.
 pub const HALF_INTERVAL: f64 = 1.96;
