@@ -49,25 +49,15 @@ pub struct Mean {
     pub restricted_to: Option<f64>,
 }
 
-/// An estimate of the survival function, a right-continuous step function from S = 1.
+/// The estimate of the survival function, a right-continuous step function from S = 1.
 ///
 /// Nothing is stored next to the sample: each number passes through it once or twice.
-#[derive(Clone, Copy, Debug)]
-pub struct KaplanMeier<'a> {
-    sample: &'a Sample,
-}
-
-impl<'a> KaplanMeier<'a> {
-    /// Creates the estimate from any sample, even an empty one.
-    pub fn new(sample: &'a Sample) -> KaplanMeier<'a> {
-        KaplanMeier { sample }
-    }
-
+impl Sample {
     /// Iterates over the steps of S, in order of time.
-    pub fn steps(&self) -> impl Iterator<Item = Step> + 'a {
-        let mut limit = ProductLimit::new(self.sample.len());
-        let mut left = self.sample.len();
-        self.sample.times().filter_map(move |(time, events, censored)| {
+    pub fn steps(&self) -> impl Iterator<Item = Step> + '_ {
+        let mut limit = ProductLimit::new(self.len());
+        let mut left = self.len();
+        self.times().filter_map(move |(time, events, censored)| {
             let at_risk = left;
             limit.events(events);
             let (survival, variance) = (limit.survival(), limit.variance());
@@ -75,21 +65,6 @@ impl<'a> KaplanMeier<'a> {
             left -= events + censored;
             (events > 0).then_some(Step { time, at_risk, events, survival, variance })
         })
-    }
-
-    /// Returns the number of members.
-    pub fn members(&self) -> usize {
-        self.sample.len()
-    }
-
-    /// Returns the number of members with an event.
-    pub fn events(&self) -> usize {
-        self.sample.events()
-    }
-
-    /// Returns the largest time, censored or not, up to which S is known.
-    pub fn last(&self) -> Option<f64> {
-        self.sample.last()
     }
 
     /// Returns S(t), the fraction of members without an event by the time t; beyond the largest time its last value.
@@ -110,7 +85,7 @@ impl<'a> KaplanMeier<'a> {
         self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
-    /// Returns the [quantiles](KaplanMeier::quantile) of ascending fractions, in one pass, up to the first that is
+    /// Returns the [quantiles](Sample::quantile) of ascending fractions, in one pass, up to the first that is
     /// unknown.
     pub fn quantiles(&self, ascending: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let mut steps = self.steps().peekable();
@@ -154,10 +129,10 @@ impl<'a> KaplanMeier<'a> {
         area.add(survival * (last - before));
         let value = first + mean.value();
         let [variance, area_variance] = self.variances(value, area);
-        let n = self.members() as f64;
+        let n = self.len() as f64;
         let [deviation, error] = if self.has_single_event() {
             [None, None]
-        } else if self.sample.censored() > 0 {
+        } else if self.censored() > 0 {
             [variance, area_variance].map(Some)
         } else {
             [variance * (n / (n - 1.0)), variance / (n - 1.0)].map(Some)
@@ -203,12 +178,12 @@ mod tests {
     use crate::Observation;
 
     /// Times with `+` for censored.
-    fn curve(times: &str) -> KaplanMeier<'static> {
+    fn curve(times: &str) -> Sample {
         let seen = |word: &str| Observation {
             time: word.trim_end_matches('+').parse().unwrap(),
             happened: !word.ends_with('+'),
         };
-        KaplanMeier::new(Box::leak(Box::new(Sample::new(times.split_whitespace().map(seen)).unwrap())))
+        Sample::new(times.split_whitespace().map(seen)).unwrap()
     }
 
     #[test]
@@ -236,8 +211,7 @@ mod tests {
     #[test]
     fn quantiles_in_one_pass_are_those_one_by_one_up_to_the_first_that_is_unknown() {
         let times = (1..40_u32).map(|i| Observation { time: f64::from(i * i), happened: i % 7 > 0 && i < 35 });
-        let sample = Sample::new(times).unwrap();
-        let survival = KaplanMeier::new(&sample);
+        let survival = Sample::new(times).unwrap();
         let shares: Vec<f64> = (0..50).map(|i| (f64::from(i) + 0.5) / 50.0).collect();
         let one_by_one: Vec<f64> = shares.iter().map_while(|share| survival.quantile(*share)).collect();
         assert!(one_by_one.len() > 30 && one_by_one.len() < 50, "{}", one_by_one.len());

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use curvelax_statistics::{Interval, KaplanMeier, Mean, Observations, Sample, interval};
+use curvelax_statistics::{Interval, Mean, Observations, Sample, interval};
 
 /// Fractions of the members whose times are in the table, with the names and meanings of the columns.
 pub const QUANTILES: [(f64, &str, &str); 5] = [
@@ -61,10 +61,9 @@ impl TimeStatistics {
 
     /// Computes the statistics of sorted times.
     pub fn of(sample: Sample) -> TimeStatistics {
-        let survival = KaplanMeier::new(&sample);
         // The usual median, also of an even number.
-        let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };
-        let (mean, quantiles) = (survival.mean(), QUANTILES.map(|(share, ..)| quantile(share)));
+        let quantile = |share| if share == 0.5 { sample.median() } else { sample.quantile(share) };
+        let (mean, quantiles) = (sample.mean(), QUANTILES.map(|(share, ..)| quantile(share)));
         let intervals = QUANTILES.map(|(share, ..)| interval::of_sample(&sample, share));
         TimeStatistics { sample, mean, quantiles, intervals }
     }
@@ -83,11 +82,6 @@ impl TimeStatistics {
             of_mean(self.mean).into_iter().chain([Statistic::new("restricted_to", restricted_to, restricted)]);
         let named = moments.chain(places(self.quantiles, self.interval())).collect();
         Numbers { known: self.sample.events(), named, intervals: intervals(&self.intervals) }
-    }
-
-    /// The share of the members that have not had the event.
-    pub fn survival(&self) -> KaplanMeier<'_> {
-        KaplanMeier::new(&self.sample)
     }
 
     /// Time by which half of the members have had the event.

@@ -19,7 +19,7 @@ use curvelax_draw::{
 use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_files::names;
 use curvelax_flow::{crystal::Energy, equilibrium::Equilibrium, flow::Flow};
-use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
+use curvelax_statistics::{HALF_INTERVAL, Interval, Sample};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     explained::{Explained, ExplainedRow, FeaturedMember, TOGETHER},
@@ -95,10 +95,10 @@ impl FinishedRun<'_> {
     /// The times of each cell as a box, and their quantiles against those of two laws.
     fn distribution(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let cells = self.statistics.cells.iter().map(|cell| {
-            let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
-            let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
+            let sample = &self.statistics.times(cell).sample;
+            let known = sample.len().min(MAX_QUANTILES);
             let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
-            let quantiles = survival.quantiles(shares());
+            let quantiles = sample.quantiles(shares());
             CellQuantiles {
                 places: self.statistics.times(cell).quantiles,
                 quantiles: shares().map(normal_quantile).zip(quantiles).collect(),
@@ -468,7 +468,7 @@ fn first_time(member: &FeaturedMember) -> Option<f64> {
 /// The survival curve of some times, with its band.
 fn survival_curve(sample: &Sample) -> SurvivalCurve {
     let mut curve = SurvivalCurve::default();
-    for step in KaplanMeier::new(sample).steps() {
+    for step in sample.steps() {
         curve.add_step(step.time, step.survival, step.band());
     }
     happened(sample, false).for_each(|t| curve.add_censored(t));
