@@ -8,6 +8,7 @@ use toml::Value;
 
 use curvelax_base::error::Result;
 use curvelax_ensemble::{Spec, Status};
+use curvelax_statistics::PairedDifferences;
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     comparison::{CellComparison, CellDifference, LeftOut},
@@ -106,7 +107,8 @@ impl LogRankDocument {
 
 impl PairedDocument {
     fn new(of: &CellDifference) -> PairedDocument {
-        let CellDifference { cell, pairs, equal, median, interval, test, left_out } = *of;
+        let CellDifference { cell, found, left_out } = *of;
+        let PairedDifferences { pairs, equal, median, interval, test } = found;
         let LeftOut { later, earlier, unknown } = left_out;
         PairedDocument {
             cell,

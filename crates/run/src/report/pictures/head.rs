@@ -11,7 +11,7 @@ use curvelax_base::{
 };
 use curvelax_draw::medium::Medium;
 use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
-use curvelax_statistics::Interval;
+use curvelax_statistics::{Interval, PairedDifferences};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics},
     comparison::{CellComparison, CellDifference},
@@ -264,9 +264,9 @@ fn compared(comparison: &CellComparison) -> Option<Headline> {
 /// How many cells differ from the first with a probability of 5 % that any of them does by chance (Bonferroni).
 fn differing(cells: &[CellDifference]) -> String {
     let most = 0.05 / cells.len() as f64;
-    let differ = cells.iter().filter(|cell| cell.test.is_some_and(|test| test.p_value < most)).count();
+    let differ = cells.iter().filter(|cell| cell.found.test.is_some_and(|test| test.p_value < most)).count();
     match cells {
-        [CellDifference { test: Some(test), .. }] => p_value(test.p_value),
+        [CellDifference { found: PairedDifferences { test: Some(test), .. }, .. }] => p_value(test.p_value),
         [_] => "not tested".into(),
         _ => format!("{differ} of {} differ", cells.len()),
     }

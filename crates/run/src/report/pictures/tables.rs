@@ -8,6 +8,7 @@ use crate::report::{
 use curvelax_base::text::{p_value, significant};
 use curvelax_ensemble::{Event, Status};
 use curvelax_files::names;
+use curvelax_statistics::PairedDifferences;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
     comparison::CellDifference,
@@ -132,13 +133,14 @@ impl FinishedRun<'_> {
     fn pairs(&self) -> Option<PageTable> {
         let cells = self.statistics.comparison.paired_cells()?;
         let row = |of: &CellDifference| {
-            let [low, high] = of.interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
+            let PairedDifferences { pairs, equal, median, interval, test } = of.found;
+            let [low, high] = interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
             let name = self.spec().sweep.name(of.cell);
-            let p = of.test.map_or(String::new(), |test| p_value(test.p_value));
-            let counts = [of.pairs, of.equal].map(|count| count.to_string());
+            let p = test.map_or(String::new(), |test| p_value(test.p_value));
+            let counts = [pairs, equal].map(|count| count.to_string());
             let left_out = [of.left_out.later, of.left_out.earlier, of.left_out.unknown].map(|count| count.to_string());
             let start = [of.cell.to_string(), name].into_iter().chain(counts);
-            start.chain([of.median, low, high].map(known(DIGITS))).chain([p]).chain(left_out).collect()
+            start.chain([median, low, high].map(known(DIGITS))).chain([p]).chain(left_out).collect()
         };
         let header = ["cell", "values", "pairs", "equal", "median", "95 % from", "to", "signed ranks"];
         let left_out = ["left out: later", "earlier", "unknown"];
