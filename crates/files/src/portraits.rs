@@ -138,6 +138,14 @@ pub fn read(path: &Path) -> Result<Vec<Film>> {
     }
 }
 
+/// Checks that this program wrote them; otherwise returns the fault.
+pub(super) fn check(films: &[Film]) -> std::result::Result<(), String> {
+    match films.iter().find_map(|film| Some((film.member, film.fault()?))) {
+        Some((member, fault)) => Err(format!("the portrait of member {member} has not {fault}")),
+        None => Ok(()),
+    }
+}
+
 /// Two digits for each coordinate.
 fn digits(coordinates: impl Iterator<Item = u16>) -> String {
     coordinates.flat_map(|v| [v >> 6, v & 63]).map(|digit| char::from(DIGITS[usize::from(digit)])).collect()

@@ -86,11 +86,9 @@ pub fn to_bytes(head: &CheckpointHead, points: usize, warnings: &[String]) -> Re
 /// # Errors
 /// A [`Fault`] unless the bytes are complete and written by this version of the program.
 pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
-    let record: Record = envelope::body(opened(*LAYOUT, bytes)?)?;
-    match record.head.films.iter().find_map(|film| Some((film.member, film.fault()?))) {
-        Some((member, fault)) => Err(Fault::Damaged(format!("the portrait of member {member} has not {fault}"))),
-        None => Ok(record),
-    }
+    let record: Record = opened(*LAYOUT, bytes)?;
+    portraits::check(&record.head.films).map_err(Fault::Damaged)?;
+    Ok(record)
 }
 
 /// Examines the folder of a shard without changing it.

@@ -60,7 +60,7 @@ impl Problem {
     pub fn solve(&self, method: &Spec, at: Resolution) -> Result<Solved> {
         let spec = self.spec(method, at).validate()?;
         let choice = placement::choose(&spec)?;
-        let precision = choice.precision();
+        let precision = choice.precision;
         let family = Family::of(&spec, self.curve.resolve(precision))?;
         let (mut backend, _) = choice.open(&spec)?;
         let mut ended: Vec<Ended> = Vec::new();

@@ -105,7 +105,7 @@ impl WorkPrecision {
     /// # Errors
     /// [`Error::Request`] if `method` is not available, [`Error::Failed`] if a member of the reference does not relax.
     pub fn new(method: &Spec) -> Result<WorkPrecision> {
-        let precision = placement::choose(&method.clone().validate()?)?.precision();
+        let precision = placement::choose(&method.clone().validate()?)?.precision;
         let exactly = Spec {
             backend: BackendChoice::Cpu,
             adapter: None,
@@ -185,7 +185,7 @@ impl WorkPrecision {
                 members.clear();
                 let cell = Cell::only(spec.clone().validate()?, family.clone());
                 let started = Instant::now();
-                simulate(&[cell], choice.precision(), backend.as_mut(), 0, members)?;
+                simulate(&[cell], choice.precision, backend.as_mut(), 0, members)?;
                 seconds.push(started.elapsed().as_secs_f64());
             }
         }
