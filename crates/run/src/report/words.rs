@@ -6,7 +6,7 @@ use curvelax_base::{
 };
 use curvelax_curve::Perturbation;
 use curvelax_ensemble::{
-    Drawn, Event, Spec,
+    Drawn, Event, Outcome, Spec,
     request::spec::{FinalTime, OrAuto, Pace, Units},
 };
 use curvelax_statistics::{GoodnessOfFit, LogRank, PairedDifferences, PowerLaw};
@@ -17,7 +17,7 @@ use curvelax_study::{
         comparison::{CellDifference, LeftOut},
         discretisation::DiscretisationError,
         scaling::Scaling,
-        tally::MemberTime,
+        tally::{Tally, shown_time},
         times::TimeStatistics,
     },
 };
@@ -177,7 +177,7 @@ pub(super) fn raw(of: &TimeStatistics, spec: &Spec) -> String {
 }
 
 /// The name of a member: that of its outline, and what distinguishes its cell.
-pub fn member_name(spec: &Spec, member: &MemberTime) -> String {
+pub fn member_name(spec: &Spec, member: &Outcome) -> String {
     let label = (!member.label.is_empty()).then(|| shortened(&member.label, MAX_GROUP));
     let cell = (!spec.sweep.is_empty()).then(|| spec.sweep.name(member.cell));
     let name = label.into_iter().chain(cell).collect::<Vec<_>>().join(", ");
@@ -193,11 +193,11 @@ pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
 }
 
 /// The time of a member with its error, or until when it had not relaxed, if that is known.
-pub fn member_time(member: &MemberTime) -> String {
-    match member.shown() {
+pub fn member_time(tally: &Tally, member: &Outcome) -> String {
+    match shown_time(member) {
         Some((t, Some(error))) => with_error(t, error),
         Some((t, None)) => significant(t),
-        None => member.later_than.map_or("not known".into(), |t| format!("> {}", significant(t))),
+        None => tally.later_than(member).map_or("not known".into(), |t| format!("> {}", significant(t))),
     }
 }
 

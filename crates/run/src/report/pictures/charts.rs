@@ -16,7 +16,7 @@ use curvelax_draw::{
     medium::Medium,
     style::SERIES,
 };
-use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
+use curvelax_ensemble::{Event, Outcome, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_files::names;
 use curvelax_flow::{crystal::Energy, equilibrium::Equilibrium, flow::Flow};
 use curvelax_statistics::{HALF_INTERVAL, Interval, Sample};
@@ -24,7 +24,7 @@ use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     explained::{Explained, ExplainedRow, FeaturedMember, TOGETHER},
     scaling::Scaling,
-    tally::{CellTally, DISTRUSTED_DRIFT, MemberTime},
+    tally::{CellTally, DISTRUSTED_DRIFT, shown_time},
     times::TimeStatistics,
 };
 
@@ -396,10 +396,11 @@ impl FinishedRun<'_> {
 
     /// The times of members that are known by name.
     fn members(&self, medium: Medium) -> PageFigure {
-        let dot = |member: &MemberTime| {
-            let (t, error) = member.shown().or(member.later_than.map(|t| (t, None)))?;
+        let dot = |member: &Outcome| {
+            let time = shown_time(member);
+            let (t, error) = time.or(self.tally.later_than(member).map(|t| (t, None)))?;
             let name = member_name(self.spec(), member);
-            Some(MemberDot { name, t, error, happened: member.shown().is_some() })
+            Some(MemberDot { name, t, error, happened: time.is_some() })
         };
         let members: Vec<MemberDot> = self.tally.named.iter().filter_map(dot).collect();
         let has = |of: &dyn Fn(&MemberDot) -> bool| members.iter().any(of);

@@ -10,14 +10,13 @@ use curvelax_base::{
     text::{count, p_value, significant},
 };
 use curvelax_draw::medium::Medium;
-use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
+use curvelax_ensemble::{Outcome, Spec, request::sweep::SweepAxis};
 use curvelax_statistics::{Interval, PairedDifferences};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics},
     comparison::{CellComparison, CellDifference},
     discretisation::DiscretisationError,
     scaling::Scaling,
-    tally::MemberTime,
 };
 
 /// Maximum characters of names in a title.
@@ -156,8 +155,8 @@ impl FinishedRun<'_> {
     }
 
     /// A member that is known by name.
-    fn of_member(&self, member: &MemberTime) -> Headline {
-        let value = format!("{}{}", member_time(member), time_unit(self.spec()));
+    fn of_member(&self, member: &Outcome) -> Headline {
+        let value = format!("{}{}", member_time(self.tally, member), time_unit(self.spec()));
         let time = if member.t_limit.is_some() { "t_limit" } else { "t_relax" };
         let data = member.t_data_error.map(|error| format!("t_data_error {}", significant(error, 2)));
         let note = [member.status.name().into()].into_iter().chain(data).collect::<Vec<_>>().join(", ");
