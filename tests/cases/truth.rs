@@ -221,7 +221,7 @@ fn misprint() -> Outcome {
     for n in [50, 100, 200] {
         let at = problem.in_steps(n, 400);
         let error = |step: fn(&mut Linear)| {
-            let p = Parameters::of_flow(&problem.flow, at.tau);
+            let p = Parameters::of_flow(&problem.flow, problem.t_end / 400.0);
             let before = wavy_circle(n, 1.0, 2, 1e-4);
             let mut curve =
                 Linear { state: State::from_nodes(&before), work: Workspace::new(Blocks::new(n).unwrap()), p };

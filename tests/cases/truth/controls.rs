@@ -87,13 +87,13 @@ impl Control {
 
     /// The resolution at which the problem is tested.
     pub fn resolution(&self) -> Resolution {
-        Resolution { n: self.n, tau: self.t_end / f64::from(self.steps), tolerance: None }
+        Resolution { n: self.n, tau: Some(self.t_end / f64::from(self.steps)), tolerance: None }
     }
 
-    /// The bound on the error relative to the exact value at a resolution of fixed τ.
+    /// The bound on the error relative to the exact value at a resolution; without fixed steps that of one step.
     pub fn bound_at(&self, at: Resolution, precision: Precision) -> f64 {
         let ErrorBound { space, time, single } = self.bound;
         let rounding = if precision == Precision::F32 { single } else { 1e-9 };
-        space * (100.0 / at.n as f64).powi(2) + time * 100.0 / (self.t_end / at.tau) + rounding
+        space * (100.0 / at.n as f64).powi(2) + time * 100.0 / (self.t_end / at.tau.unwrap_or(self.t_end)) + rounding
     }
 }

@@ -23,9 +23,9 @@ const LEMNISCATE: f64 = 5.244_115_108_584_239;
 pub struct Resolution {
     /// Nodes.
     pub n: usize,
-    /// Time step τ.
-    pub tau: f64,
-    /// Local error tolerance of adaptive steps, which replace τ.
+    /// Time step τ, of fixed steps.
+    pub tau: Option<f64>,
+    /// Local error tolerance of adaptive steps, which replace these.
     pub tolerance: Option<f64>,
 }
 
@@ -116,12 +116,7 @@ impl Problem {
 
     /// Returns the resolution of n nodes and `steps` equal steps.
     pub fn in_steps(&self, n: usize, steps: u32) -> Resolution {
-        Resolution { n, tau: self.t_end / f64::from(steps), tolerance: None }
-    }
-
-    /// Returns the resolution of n nodes and adaptive steps.
-    pub fn to_tolerance(&self, n: usize, tolerance: f64) -> Resolution {
-        Resolution { n, tau: self.t_end, tolerance: Some(tolerance) }
+        Resolution { n, tau: Some(self.t_end / f64::from(steps)), tolerance: None }
     }
 }
 
