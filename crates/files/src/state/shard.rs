@@ -19,7 +19,7 @@ use super::{
 use crate::{
     claim,
     growing::Growing,
-    names::{PORTRAITS, RUN, SHARD, STATE, STATE_OLD},
+    names::{PORTRAITS, RUN, SHARD, SHOWN, STATE, STATE_OLD},
     part_file::Mark,
     portraits, reader,
 };
@@ -32,8 +32,6 @@ use curvelax_study::results::provenance::rfc3339;
 
 /// Keys that a resumed run may change.
 const MOVED_KEYS: [&str; 3] = ["threads", "backend", "adapter"];
-/// Characters of a fault in a message.
-const SHOWN: usize = 200;
 
 /// The fingerprint of the layout of the file's content.
 pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Record>);
