@@ -242,10 +242,12 @@ impl<'a> Summary<'a> {
         if cell != own {
             return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }
-        if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
-            self.spec_of = Some((cell, self.spec.of_cell(cell)?));
-        }
-        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.final_time());
+        let spec = match self.spec_of.take() {
+            Some((of, spec)) if of == cell => spec,
+            _ => self.spec.of_cell(cell)?,
+        };
+        let (_, spec) = self.spec_of.insert((cell, spec));
+        let t_end = spec.final_time();
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
@@ -255,7 +257,7 @@ impl<'a> Summary<'a> {
         outcome.events = rows.iter().map(EventTime::time).collect();
         let limits = rows.iter().map(|row| row.t_limit.zip(row.t_error));
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
-        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| linear_rate::rate_of(spec, &outcome));
+        outcome.rate_theory = linear_rate::rate_of(spec, &outcome);
         let judged = |of: &Outcome| {
             [
                 ("t_limit", of.t_limit),
@@ -266,9 +268,7 @@ impl<'a> Summary<'a> {
             ]
         };
         let (told, points) = (judged(&outcome), outcome.points);
-        if let Some((_, spec)) = &self.spec_of {
-            self.levels.judge(spec, &mut outcome);
-        }
+        self.levels.judge(spec, &mut outcome);
         if let Some((found, _)) = judged(&outcome).into_iter().zip(told).find(|(found, told)| found != told) {
             let (value, file) = (found.1.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
             return Err(fields.unexpected_in(found.0, &format!("{value}, as {file} has it")));

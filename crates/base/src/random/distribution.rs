@@ -35,21 +35,7 @@ use crate::{
 const MAX_CHOICES: usize = 1000;
 /// Maximum values, one for each member.
 const MAX_VALUES: usize = 100_000;
-/// The names of the distributions.
-pub const NAMES: [&str; 11] = [
-    "uniform",
-    "loguniform",
-    "normal",
-    "lognormal",
-    "halfnormal",
-    "gamma",
-    "weibull",
-    "choice",
-    "each",
-    "empirical",
-    "table",
-];
-/// What each needs.
+/// The distributions, with what each needs.
 const USAGE: &str = "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), halfnormal(SD), \
                      gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), each(A,B,...), empirical(A,B,...), \
                      table(FILE,COLUMN); continuous ones also as DISTRIBUTION in A..B";
@@ -165,7 +151,10 @@ impl Distribution {
                 let (file, column) = arguments.rsplit_once(',').ok_or_else(|| wrong("not two names", usage))?;
                 column_of(Path::new(file.trim()), column.trim()).map(Distribution::Each)
             }
-            _ => Err(format!("unknown distribution `{}`{}; one of {USAGE}", echo(name), did_you_mean(name, NAMES))),
+            _ => {
+                let names = USAGE.split(", ").filter_map(|form| Some(form.split_once('(')?.0));
+                Err(format!("unknown distribution `{}`{}; one of {USAGE}", echo(name), did_you_mean(name, names)))
+            }
         }
     }
 

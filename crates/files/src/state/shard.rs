@@ -132,8 +132,7 @@ fn part(path: &Path) -> Result<FinishedShard> {
     let faulty = |fault: &str| faulty(path, SHARD, fault);
     let read = envelope::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
     let record = read.map_err(|(Fault::Foreign(what) | Fault::Damaged(what))| faulty(&what))?;
-    let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
-    let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
+    let spec = Spec::from_toml(&record.head.origin.spec).and_then(|spec| spec.validate().map_err(|e| e.to_string()));
     let spec = spec.map_err(|e| faulty(&format!("its spec: {}", shortened(&one_line(&e), SHOWN))))?;
     let Some(shard) = spec.shard else {
         return Err(faulty("its spec is not of a shard"));
