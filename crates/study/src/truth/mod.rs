@@ -15,10 +15,11 @@
 //!
 //! # Practice
 //!
-//! A [`Problem`] is a value: flow, curve, final time, the measured quantity, and its exact value. [`problems`] is the single table of them, for the tests on every back end and for `curvelax convergence`.
-//! [`Problem::solve`] runs it at a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number.
-//! [`WorkPrecision`] measures what an error of the relaxation time costs. A [`Referee`] solves the flow of any smooth
-//! curve by another method; a [`RefereeRow`] compares a relaxation time with it.
+//! A [`Problem`] is a value: flow, curve, final time, the measured quantity, and its exact value. [`problems`] is the
+//! single table of them, for the tests on every back end and for `curvelax convergence`. [`Problem::solve`] runs it at
+//! a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number. [`WorkPrecision`] measures what an
+//! error of the relaxation time costs. A [`Referee`] solves the flow of any smooth curve by another method; a
+//! [`RefereeRow`] compares a relaxation time with it.
 
 mod convergence;
 mod fourier;

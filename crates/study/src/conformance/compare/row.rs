@@ -7,8 +7,8 @@ use crate::conformance::bounds::Bound;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::solver::Solver;
 
-/// What the kernel and its twin leave of a member. What is compared is taken from both by one function, so that one side
-/// cannot be passed twice.
+/// What the kernel and its twin leave of a member. What is compared is taken from both by one function, so that one
+/// side cannot be passed twice.
 pub(super) struct Sides<'a> {
     pub(super) member: usize,
     pub(super) on_gpu: &'a Left,
