@@ -82,7 +82,7 @@ impl Bench {
     /// if a member does.
     pub fn open(spec: &Spec, window: Duration) -> Result<Bench> {
         let choice = placement::choose(spec)?;
-        let precision = choice.precision();
+        let precision = choice.precision;
         let family = Family::new(spec)?;
         let count = usize::try_from(spec.curves).unwrap_or(usize::MAX);
         let member = |index: usize| {

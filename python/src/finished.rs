@@ -8,7 +8,7 @@ use curvelax::{
     paper::{PaperFormat, PaperWidth, Printer, USUAL_DPI, missing_letters},
     report::pictures,
     results::EnsembleStatistics,
-    statistics::{KaplanMeier, Observation, Sample, Step},
+    statistics::{Observation, Sample, Step},
 };
 use numpy::PyArray1;
 use pyo3::{
@@ -24,18 +24,17 @@ type Curve<'py> = ([Bound<'py, PyArray1<f64>>; 5], Option<f64>);
 
 /// The survival curve of some times.
 fn curve<'py>(py: Python<'py>, sample: &Sample) -> Curve<'py> {
-    let estimate = KaplanMeier::new(sample);
     let array = |start: f64, of: &dyn Fn(Step) -> f64| {
-        PyArray1::from_iter(py, [start].into_iter().chain(estimate.steps().map(of)))
+        PyArray1::from_iter(py, [start].into_iter().chain(sample.steps().map(of)))
     };
     let numbers = [
         array(0.0, &|step| step.time),
-        array(estimate.members() as f64, &|step| step.at_risk as f64),
+        array(sample.len() as f64, &|step| step.at_risk as f64),
         array(1.0, &|step| step.survival),
         array(1.0, &|step| step.band().0),
         array(1.0, &|step| step.band().1),
     ];
-    (numbers, estimate.last())
+    (numbers, sample.last())
 }
 
 /// A finished run as read from its folder.

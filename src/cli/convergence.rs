@@ -18,14 +18,10 @@ use crate::{
         request::spec::{BackendChoice, Precision, Solver, SolverChoice},
     },
     error::{Error, Result},
-    files::{
-        OutputFolder, Owner, names,
-        tables::Table,
-        truth_tables::{CostRow, ErrorRow},
-    },
+    files::{OutputFolder, Owner, names, tables::Table},
     placement,
     text::significant,
-    truth::{ConvergenceRow, Problem, WorkPrecision, WorkRow, problems, studies},
+    truth::{ConvergenceRow, Problem, Stepping, WorkPrecision, WorkRow, problems, studies},
 };
 
 const EXAMPLES: &str = "\
@@ -142,8 +138,7 @@ pub fn convergence(args: ConvergenceArgs) -> Result<()> {
         }
     }
     if let Some(folder) = folder {
-        let errors: Vec<ErrorRow> = rows.iter().map(ErrorRow::of).collect();
-        let file = Table::of(folder.file(names::CONVERGENCE)?, &errors)?;
+        let file = Table::of(folder.file(names::CONVERGENCE)?, &rows)?;
         folder.publish_all(vec![file])?;
     }
     if !args.quiet {
@@ -189,8 +184,7 @@ fn work_precision(
         }
     }
     if let Some(folder) = folder {
-        let costs: Vec<CostRow> = rows.iter().flatten().map(CostRow::of).collect();
-        let table = Table::of(folder.file(names::WORK)?, &costs)?;
+        let table = Table::of(folder.file(names::WORK)?, &rows.concat())?;
         let draw = |medium| work_diagram(&measured, solvers, &rows, medium);
         let pictures = prints.write(&folder, work_picture, WORK_TITLE, draw)?;
         if !quiet {
@@ -210,10 +204,10 @@ fn work_line([solver, order, tau, tolerance, error, solves, sweeps, ms]: [&str; 
 
 fn work_row(row: &WorkRow) -> String {
     let short = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.1e}"));
-    let (tau, tolerance) = row.stepping.settings();
+    let Stepping { tau, tolerance, most_order } = row.stepping;
     work_line([
         row.solver.name(),
-        &row.stepping.order().to_string(),
+        &most_order.to_string(),
         &short(tau),
         &short(tolerance),
         &short(row.error),
@@ -226,7 +220,7 @@ fn work_row(row: &WorkRow) -> String {
 /// Errors against solves and seconds, a row of panels for each solver.
 fn work_diagram(measured: &WorkPrecision, solvers: &[Solver], rows: &[Vec<WorkRow>], medium: Medium) -> String {
     let curve = |way: &Vec<WorkRow>| WorkCurve {
-        label: match way.first().map_or(1, |row| row.stepping.order()) {
+        label: match way.first().map_or(1, |row| row.stepping.most_order) {
             1 => "fixed steps".into(),
             order => format!("order up to {order}"),
         },
@@ -257,7 +251,7 @@ fn table(rows: &[ConvergenceRow]) -> String {
             before = problem;
         }
         let short = |value: Option<f64>| value.map_or("-".to_string(), |value| format!("{value:.2e}"));
-        let tau = short(at.tolerance.is_none().then_some(at.tau));
+        let tau = short(at.tau);
         let error = error.map_or(status.name().to_string(), |error| format!("{error:+.2e}"));
         let order = order.map_or("-".to_string(), |order| format!("{order:.2}"));
         text += &line([problem, varied.name(), &at.n.to_string(), &tau, &short(at.tolerance), &error, &order]);
@@ -278,7 +272,7 @@ mod tests {
         let row = |problem: &str, status, error| ConvergenceRow {
             problem: problem.into(),
             varied: Varied::Nodes,
-            at: Resolution { n: 50, tau: 0.001, tolerance: None },
+            at: Resolution { n: 50, tau: Some(0.001), tolerance: None },
             status,
             error,
             order: error.map(|_| 1.998),

@@ -4,7 +4,10 @@
 //! A missed bound means an error, not that the bound is too tight. Without an adapter, GPU cases fail, unless
 //! `ALLOW_NO_GPU=1`: then they are reported as ignored.
 
+mod controls;
+
 use crate::{everything, may_lack_gpu};
+use controls::Control;
 use curvelax::{
     backend::gpu::Gpu,
     ensemble::{
@@ -67,14 +70,15 @@ pub fn trials() -> Vec<Trial> {
 
 /// Whether a run is within its bound of the exact value, and not within it of the mistaken one.
 fn judge(problem: &Problem, method: &Spec) -> Outcome {
-    let at = problem.resolution();
+    let control = Control::of(problem);
+    let at = control.resolution();
     let Solved { ratio, outcome, precision, .. } = problem.solve(method, at).map_err(|e| e.to_string())?;
     let Some(ratio) = ratio else {
         return Err(format!("ended as {} at t = {}", outcome.status.name(), outcome.t_end).into());
     };
-    let (error, bound) = (ratio - 1.0, problem.bound_at(at, precision));
-    let mistaken = ratio * problem.exact / problem.mistaken - 1.0;
-    let line = format!("{}: error {error:+.2e}, bound {bound:.2e}; {}: {mistaken:+.2e}", problem.name, problem.mistake);
+    let (error, bound) = (ratio - 1.0, control.bound_at(at, precision));
+    let mistaken = ratio * problem.exact / control.mistaken - 1.0;
+    let line = format!("{}: error {error:+.2e}, bound {bound:.2e}; {}: {mistaken:+.2e}", problem.name, control.mistake);
     println!("{line}");
     if error.abs() <= bound && mistaken.abs() > bound { Ok(()) } else { Err(line.into()) }
 }
@@ -140,11 +144,12 @@ fn within_tolerance(rows: &[ConvergenceRow], most: f64, above_a_hundredth: &mut 
 fn orders() -> Outcome {
     let mut above_a_hundredth = 0;
     for problem in problems() {
+        let control = Control::of(&problem);
         for study in studies(&problem, Solver::Direct) {
             let rows = study.rows(&problem, &reference()).map_err(|e| e.to_string())?;
             for row in &rows {
                 let error = row.error.ok_or("ended early")?;
-                let bound = problem.bound_at(row.at, Precision::F64);
+                let bound = control.bound_at(row.at, Precision::F64);
                 println!("{}, {:?}: error {error:+.2e}, bound {bound:.2e}", problem.name, row.at);
                 if error.abs() > bound && row.at.tolerance.is_none() {
                     return Err(format!("{}, {:?}: error {error:e} above {bound:e}", problem.name, row.at).into());
@@ -166,7 +171,7 @@ fn orders() -> Outcome {
             // Steps that leave no error have no order.
             let errors = || rows.iter().filter_map(|row| row.error);
             let spread = errors().fold(f64::MIN, f64::max) - errors().fold(f64::MAX, f64::min);
-            if study.varied == Varied::Step && problem.bound.time < 1e-8 && spread < problem.bound.time {
+            if study.varied == Varied::Step && control.bound.time < 1e-8 && spread < control.bound.time {
                 continue;
             }
             let last = rows.last().and_then(|row| row.order);
@@ -216,7 +221,7 @@ fn misprint() -> Outcome {
     for n in [50, 100, 200] {
         let at = problem.in_steps(n, 400);
         let error = |step: fn(&mut Linear)| {
-            let p = Parameters::of_flow(&problem.flow, at.tau);
+            let p = Parameters::of_flow(&problem.flow, problem.t_end / 400.0);
             let before = wavy_circle(n, 1.0, 2, 1e-4);
             let mut curve =
                 Linear { state: State::from_nodes(&before), work: Workspace::new(Blocks::new(n).unwrap()), p };
@@ -225,7 +230,7 @@ fn misprint() -> Outcome {
             Measure::Decay(2).of(&before, &after) / problem.exact - 1.0
         };
         let (correct, printed) = (error(correct_step), error(misprinted_step));
-        let bound = problem.bound_at(at, Precision::F64);
+        let bound = Control::of(&problem).bound_at(at, Precision::F64);
         println!("n = {n}: error {correct:+.2e}, as printed {printed:+.2e}, bound {bound:.2e}");
         assert!(correct.abs() <= bound, "n = {n}: {correct:e}");
         assert!(printed > 1.0, "n = {n}, as printed: {printed:e}");

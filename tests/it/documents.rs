@@ -10,12 +10,10 @@ use std::{
 use curvelax::{
     backend::gpu::shader::{Variant, workgroup_bytes},
     ensemble::{Spec, request::event::MAX_EVENTS},
-    files::{
-        TableRow, columns, names,
-        truth_tables::{CostRow, ErrorRow, TruthRow},
-    },
+    files::{TableRow, columns, names, truth_tables::TruthRow},
     results::{cells::EnsembleStatistics, tally::Tally},
     solver::{Blocks, Solver},
+    truth::{ConvergenceRow, WorkRow},
 };
 
 use crate::common::command::program;
@@ -161,9 +159,9 @@ fn columns() -> String {
         of_run(names::MEAN_EXCESS, "cell and time"),
         of_run(names::SERIES, "member and time, with `--series`"),
         of_run(names::SNAPSHOTS, "member, time and node, with `--snapshots`"),
-        table_of::<ErrorRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
+        table_of::<ConvergenceRow>(names::CONVERGENCE, "run of a problem, from `curvelax convergence --out`"),
         table_of::<TruthRow>(names::REFEREE, "time of a member, from `curvelax convergence --referee --out`"),
-        table_of::<CostRow>(names::WORK, "method, from `curvelax convergence --work-precision --out`"),
+        table_of::<WorkRow>(names::WORK, "method, from `curvelax convergence --work-precision --out`"),
     ]
     .concat()
 }

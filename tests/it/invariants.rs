@@ -38,7 +38,7 @@ fn relaxed(spec: &Spec, curve: impl Fn(f64) -> DVec2 + Send + Sync + 'static) ->
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, BaseCurve::from_formula(curve)).unwrap();
     let choice = placement::choose(&spec).unwrap();
-    let precision = choice.precision();
+    let precision = choice.precision;
     let (mut backend, _) = choice.open(&spec).unwrap();
     let mut last = Last(None);
     simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), 1, &mut last).unwrap();

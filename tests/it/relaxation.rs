@@ -57,7 +57,7 @@ fn run_of(spec: &Spec, curve: BaseCurve) -> Vec<Ended> {
     let spec = spec.clone().validate().unwrap();
     let family = Family::of(&spec, curve).unwrap();
     let choice = placement::choose(&spec).unwrap();
-    let precision = choice.precision();
+    let precision = choice.precision;
     let (mut backend, _) = choice.open(&spec).unwrap();
     let mut all = Vec::new();
     simulate(&[Cell::only(spec, family)], precision, backend.as_mut(), usize::MAX, &mut all).unwrap();

@@ -95,8 +95,8 @@ fn run(spec: &Spec, out: &Path, patience: u32) -> Result<(u32, u64)> {
         // More each time, so that the run ends although some of its work is lost.
         let patience = patience.saturating_add(piece / 4);
         let mut sink = Impatient { report: &mut report, patience, at_once: piece % 3 == 0, waits: false, spilled: 0 };
-        let (mut backend, _) = choice.open_for(cells)?;
-        let done = resume(cells, choice.precision(), backend.as_mut(), 2, progress, &mut sink);
+        let (mut backend, _) = choice.open_for(cells, &placement::OpeningWatch::default())?;
+        let done = resume(cells, choice.precision, backend.as_mut(), 2, progress, &mut sink);
         spilled += sink.spilled;
         match done {
             Err(Error::Stopped(_)) => assert!(report.give_up()),

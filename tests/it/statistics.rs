@@ -5,9 +5,7 @@
 
 use std::{fs, path::PathBuf};
 
-use curvelax::statistics::{
-    Description, Interval, KaplanMeier, Line, Observation, PowerLaw, Sample, interval, log_rank,
-};
+use curvelax::statistics::{Description, Interval, Line, Observation, PowerLaw, Sample, interval, log_rank};
 use proptest::{prelude::*, test_runner::RngSeed};
 use toml::{Table, Value};
 
@@ -106,13 +104,11 @@ fn over_samples(
     rows: &[Row],
     set: &Value,
     entry: &str,
-    compare: impl Fn(&KaplanMeier, &Value) -> (Vec<Option<f64>>, Vec<Option<f64>>),
+    compare: impl Fn(&Sample, &Value) -> (Vec<Option<f64>>, Vec<Option<f64>>),
 ) -> f64 {
     let samples = set["samples"].as_table().unwrap();
     let differences = samples.iter().filter(|(_, expected)| expected.get(entry).is_some()).map(|(name, expected)| {
-        let sample = sample(rows, name.parse().ok());
-        let curve = KaplanMeier::new(&sample);
-        let (found, expected) = compare(&curve, expected);
+        let (found, expected) = compare(&sample(rows, name.parse().ok()), expected);
         worst(&found, &expected)
     });
     differences.fold(0.0, f64::max)
@@ -190,7 +186,7 @@ fn apart_from_r(rows: &[Row], set: &str, table: &str) -> f64 {
     for line in table.lines().filter(|line| line.split('\t').next() == Some(set)) {
         let [_, group, value, error, statistic]: [&str; 5] = line.split('\t').collect::<Vec<_>>().try_into().unwrap();
         let sample = sample(rows, group.parse().ok());
-        let mean = KaplanMeier::new(&sample).mean();
+        let mean = sample.mean();
         // Without censoring, R divides by n instead of the usual n - 1.
         let n = sample.len() as f64;
         let share = if sample.censored() == 0 { ((n - 1.0) / n).sqrt() } else { 1.0 };
@@ -257,9 +253,8 @@ fn without_censoring_the_median_is_the_usual_one() {
     for members in [100, 101] {
         let sample = sample(&rows[..members], None);
         let usual = Description::new(sample.observations().map(|seen| seen.time)).unwrap().median();
-        let curve = KaplanMeier::new(&sample);
-        assert_eq!(worst(&[curve.median()], &[usual]), 0.0, "{members}");
-        assert_eq!(curve.quantile(0.5) == usual, members == 101, "blind to the convention");
+        assert_eq!(worst(&[sample.median()], &[usual]), 0.0, "{members}");
+        assert_eq!(sample.quantile(0.5) == usual, members == 101, "blind to the convention");
     }
 }
 
@@ -331,38 +326,38 @@ proptest! {
     #[test]
     fn a_curve_is_its_definition_and_falls_and_its_numbers_are_numbers(observations in samples()) {
         let sample = Sample::new(observations.iter().copied()).unwrap();
-        let curve = KaplanMeier::new(&sample);
         let mut before = 1.0;
-        for step in curve.steps() {
+        for step in sample.steps() {
             prop_assert!(step.survival < before && step.survival >= 0.0 && step.variance >= 0.0);
             prop_assert!(step.variance <= 0.25 && step.events <= step.at_risk);
             prop_assert!((step.survival - survival_by_definition(&observations, step.time)).abs() < 1e-13);
-            prop_assert_eq!(curve.survival(step.time), step.survival);
+            prop_assert_eq!(sample.survival(step.time), step.survival);
             before = step.survival;
         }
         for p in LEVELS.into_iter().chain([0.0, 1.0]) {
-            match curve.quantile(p) {
+            match sample.quantile(p) {
                 Some(t) => {
-                    let [at, before] = [t, t - 1e-9].map(|t| curve.survival(t));
+                    let [at, before] = [t, t - 1e-9].map(|t| sample.survival(t));
                     prop_assert!(at <= 1.0 - p + 1e-12 && before > 1.0 - p - 1e-12);
                 }
-                None => prop_assert!(curve.steps().last().is_none_or(|step| step.survival > 1.0 - p)),
+                None => prop_assert!(sample.steps().last().is_none_or(|step| step.survival > 1.0 - p)),
             }
         }
-        if let Some(mean) = curve.mean() {
+        if let Some(mean) = sample.mean() {
             let numbers = [Some(mean.value), mean.standard_deviation, mean.standard_error, mean.restricted_to];
             prop_assert!(numbers.iter().flatten().all(|x| x.is_finite() && *x >= 0.0), "{:?}", mean);
             prop_assert!(mean.value <= sample.last().unwrap() + 1e-12);
         }
-        prop_assert_eq!(curve.mean().is_none(), sample.events() == 0);
-        prop_assert_eq!(curve.caveat().is_none(), sample.events() > 1 && before == 0.0);
+        prop_assert_eq!(sample.mean().is_none(), sample.events() == 0);
+        let whole = sample.mean().is_some_and(|mean| mean.restricted_to.is_none() && mean.standard_error.is_some());
+        prop_assert_eq!(whole, sample.events() > 1 && before == 0.0);
         for p in LEVELS {
             let found = interval::of_sample(&sample, p);
             prop_assert!(found.is_some() || sample.len() < 2 || p != 0.5);
             if let Some(Interval { lower, upper, coverage, range_of }) = found {
                 prop_assert!(lower.unwrap_or(f64::MIN) <= upper.unwrap_or(f64::MAX));
                 prop_assert!((0.0..=1.0).contains(&coverage) && (coverage < 0.95) == range_of.is_some());
-                if let Some(t) = curve.quantile(p) {
+                if let Some(t) = sample.quantile(p) {
                     prop_assert!(lower.is_none_or(|lower| lower <= t) && upper.is_none_or(|upper| t <= upper));
                 }
             }
@@ -377,9 +372,8 @@ proptest! {
         prop_assert_eq!(&sample, &Sample::new(turned).unwrap());
         let scaled = observations.iter().map(|o| Observation { time: 1024.0 * o.time, ..*o });
         let scaled = Sample::new(scaled).unwrap();
-        let (curve, scaled) = (KaplanMeier::new(&sample), KaplanMeier::new(&scaled));
-        prop_assert_eq!(curve.median().map(|t| 1024.0 * t), scaled.median());
-        prop_assert_eq!(curve.mean().map(|mean| 1024.0 * mean.value), scaled.mean().map(|mean| mean.value));
+        prop_assert_eq!(sample.median().map(|t| 1024.0 * t), scaled.median());
+        prop_assert_eq!(sample.mean().map(|mean| 1024.0 * mean.value), scaled.mean().map(|mean| mean.value));
     }
 
     #[test]

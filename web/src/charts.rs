@@ -5,7 +5,7 @@ use curvelax_draw::{
     medium::Medium,
 };
 use curvelax_ensemble::{Spec, outcome::linear_rate};
-use curvelax_statistics::{HALF_INTERVAL, KaplanMeier, Observation, Sample, Step};
+use curvelax_statistics::{HALF_INTERVAL, Observation, Sample, Step};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -58,7 +58,7 @@ impl Shown {
         let seen = self.times.iter().map(|(t, relaxed)| Observation::new(relaxed.then_some(*t), *t));
         let sample = Sample::new(seen).map_err(|error| error.to_string())?;
         let mut curve = SurvivalCurve::default();
-        for Step { time, survival, variance, .. } in KaplanMeier::new(&sample).steps() {
+        for Step { time, survival, variance, .. } in sample.steps() {
             let bound = |sign: f64| (survival + sign * HALF_INTERVAL * variance.sqrt()).clamp(0.0, 1.0);
             curve.add_step(time, survival, (bound(-1.0), bound(1.0)));
         }

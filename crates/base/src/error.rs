@@ -104,27 +104,21 @@ pub fn shortened(text: &str, most: usize) -> String {
         if length >= most {
             return shown + "...";
         }
-        let before = shown.len();
-        match c.is_control() {
-            true => shown.extend(c.escape_debug()),
-            false => shown.push(c),
-        }
-        length += if c.is_control() { shown.len() - before } else { 1 };
+        let one = escaped(c);
+        length += one.chars().count();
+        shown += &one;
     }
     shown
 }
 
+/// A character as it is shown: control characters are escaped.
+fn escaped(c: char) -> String {
+    if c.is_control() { c.escape_debug().to_string() } else { c.into() }
+}
+
 /// Escapes control characters in `text` other than line breaks: it may quote a file, and a terminal would obey them.
 pub fn without_controls(text: &str) -> String {
-    let mut shown = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\n' | '\t' => shown.push(c),
-            c if c.is_control() => shown.extend(c.escape_debug()),
-            c => shown.push(c),
-        }
-    }
-    shown
+    text.chars().map(|c| if matches!(c, '\n' | '\t') { c.into() } else { escaped(c) }).collect()
 }
 
 /// Maximum characters of a value that is all of a flag; it may be a path.

@@ -6,7 +6,8 @@ use serde::Serialize;
 use super::fields::Fields;
 use curvelax_base::error::Result;
 use curvelax_ensemble::Status;
-use curvelax_flow::number::Precision;
+use curvelax_flow::{number::Precision, solver::Solver};
+use curvelax_study::truth::Varied;
 
 /// A row of a table, as the program holds it.
 pub trait TableRow: Sized + 'static {
@@ -114,6 +115,10 @@ macro_rules! kinds {
 kinds! {
     /// A count or an index.
     whole of u64, "integer": |v| Field::Whole(*v), |fields| fields.whole();
+    /// A number of nodes.
+    nodes of usize, "integer": |v| Field::Whole(*v as u64), |fields| fields.whole();
+    /// A small count.
+    small of u32, "integer": |v| Field::Whole(u64::from(*v)), |fields| fields.whole();
     /// An integer of either sign.
     signed of i32, "integer": |v| Field::Signed(i64::from(*v)), |fields| fields.whole();
     /// How a member ended.
@@ -121,6 +126,10 @@ kinds! {
     /// The numbers in which a member was computed.
     precision of Precision, "word": |v| Field::Word(v.name()),
         |fields| fields.one_of([Precision::F32, Precision::F64], Precision::name);
+    /// What a study refines.
+    varied of Varied, "word": |v| Field::Word(v.name()), |fields| fields.one_of(Varied::ALL, Varied::name);
+    /// A solver of the systems.
+    solver of Solver, "word": |v| Field::Word(v.name()), |fields| fields.one_of(Solver::ALL, Solver::name);
     /// A count or an index, or none.
     rank of Option<u64>, "integer": |v| v.map_or(Field::Float(None), Field::Whole), |fields| fields.whole_or_none();
     /// Any word.

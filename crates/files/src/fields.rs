@@ -4,11 +4,8 @@ use std::{path::Path, str::FromStr};
 
 use csv::StringRecord;
 
-use super::names::spoilt;
+use super::names::{SHOWN, spoilt};
 use curvelax_base::error::{Error, Result, shortened};
-
-/// Characters of foreign text in a message.
-const SHOWN: usize = 200;
 
 /// The fields of a line, read from left to right.
 pub struct Fields<'a> {

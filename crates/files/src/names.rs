@@ -2,7 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use curvelax_base::error::Error;
+use serde::Deserialize;
+
+use curvelax_base::{
+    error::{Error, Result, plainly, shortened},
+    input,
+};
 
 /// One row per member.
 pub const SUMMARY: &str = "summary.csv";
@@ -151,6 +156,9 @@ pub fn on_paper(name: &str, extension: &str) -> Option<String> {
     Some(format!("{stem}{extension}"))
 }
 
+/// Characters of foreign text in a message.
+pub(super) const SHOWN: usize = 200;
+
 /// The remedy for a file that was changed or truncated.
 pub const REMEDY: &str = "restore the file, or run again";
 
@@ -158,6 +166,16 @@ pub const REMEDY: &str = "restore the file, or run again";
 pub(super) fn spoilt(path: &Path, place: &str, problem: &str) -> Error {
     let comma = if place.is_empty() { "" } else { ", " };
     Error::Request(format!("{}{comma}{place}: {problem}; {REMEDY}", path.display()))
+}
+
+/// The text of the file at `path`, of at most `most` bytes.
+pub(super) fn text_of(path: &Path, most: u64) -> Result<String> {
+    input::text(path, most).map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))
+}
+
+/// The value in `text`, which is that of the JSON file at `path`.
+pub(super) fn parsed<'a, T: Deserialize<'a>>(path: &Path, text: &'a str) -> Result<T> {
+    serde_json::from_str(text).map_err(|e| spoilt(path, "", &shortened(&plainly(&e.to_string()), SHOWN)))
 }
 
 /// The folder of the plots.

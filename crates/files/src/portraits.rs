@@ -8,10 +8,10 @@ use std::path::Path;
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use super::names::{self, spoilt};
+use super::names::{self, parsed, spoilt, text_of};
 use curvelax_base::{
     drawable::is_drawable,
-    error::{Error, Result, plainly, shortened},
+    error::{Error, Result, shortened},
     input,
 };
 use curvelax_ensemble::{Outcome, Portrait, Status};
@@ -128,13 +128,19 @@ pub fn to_json(films: &[Film]) -> Result<String> {
 /// # Errors
 /// [`Error::Request`] naming the file, and the member if there is one.
 pub fn read(path: &Path) -> Result<Vec<Film>> {
-    let text = input::text(path, input::MAX_PORTRAITS);
-    let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let Portraits { members } =
-        serde_json::from_str(&text).map_err(|e| spoilt(path, "", &shortened(&plainly(&e.to_string()), 200)))?;
+    let text = text_of(path, input::MAX_PORTRAITS)?;
+    let Portraits { members } = parsed(path, &text)?;
     match members.iter().find_map(|film| Some((film.member, film.fault()?))) {
         Some((member, expected)) => Err(spoilt(path, &format!("member {member}"), &format!("expected {expected}"))),
         None => Ok(members),
+    }
+}
+
+/// Checks that this program wrote them; otherwise returns the fault.
+pub(super) fn check(films: &[Film]) -> std::result::Result<(), String> {
+    match films.iter().find_map(|film| Some((film.member, film.fault()?))) {
+        Some((member, fault)) => Err(format!("the portrait of member {member} has not {fault}")),
+        None => Ok(()),
     }
 }
 

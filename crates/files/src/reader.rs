@@ -9,13 +9,13 @@ use serde::Deserialize;
 use crate::{
     TableReader, TableRow, claim,
     members::MemberReader,
-    names::{self, REMEDY, spoilt},
+    names::{self, SHOWN, parsed, spoilt, text_of},
     place::Place,
     portraits::{self, Film},
     tables::{EventLevelRow, EventRow},
 };
 use curvelax_base::{
-    error::{Error, Result, plainly, shortened},
+    error::{Error, Result, shortened},
     input,
     text::quoted,
 };
@@ -28,8 +28,6 @@ use curvelax_study::results::{
 
 /// Relative distance behind the end at which a time is still rounding, in f32.
 const LATE: f64 = 1e-6;
-/// Characters of foreign text in a message.
-const SHOWN: usize = 200;
 
 /// A run as read from its folder.
 pub struct Finished {
@@ -88,9 +86,9 @@ struct RunHead {
 /// Those of [`Finished::read`].
 pub fn provenance(folder: &Path) -> Result<Provenance> {
     let path = folder.join(names::RUN);
-    let refuse = |problem: String| Err(Error::Request(format!("{}{problem}", path.display())));
+    let refuse = |path: &Path, problem: String| Err(Error::Request(format!("{}: {problem}", path.display())));
     if !folder.is_dir() {
-        return Err(Error::Request(format!("{}: no such folder; give that of a run", folder.display())));
+        return refuse(folder, "no such folder; give that of a run".into());
     }
     if !path.exists() {
         let begun = folder.join(format!(".{}.part", names::SUMMARY)).exists();
@@ -101,40 +99,32 @@ pub fn provenance(folder: &Path) -> Result<Provenance> {
         } else {
             "no run there; give its folder".into()
         };
-        return Err(Error::Request(format!("{}: {problem} (no {})", folder.display(), names::RUN)));
+        return refuse(folder, format!("{problem} (no {})", names::RUN));
     }
-    let text = input::text(&path, input::MAX_RUN);
-    let text = text.map_err(|e| Error::Request(format!("cannot read {}: {e}", path.display())))?;
-    let no_json = |e: serde_json::Error| format!(": {}; {REMEDY}", shortened(&plainly(&e.to_string()), SHOWN));
-    let RunHead { curvelax, format } = match serde_json::from_str(&text) {
-        Ok(head) => head,
-        Err(e) => return refuse(no_json(e)),
-    };
+    let text = text_of(&path, input::MAX_RUN)?;
+    let RunHead { curvelax, format } = parsed(&path, &text)?;
     let Some(version) = curvelax.as_str() else {
-        return refuse(": not written by curvelax: expected its version under `curvelax`, found none".into());
+        return refuse(&path, "not written by curvelax: expected its version under `curvelax`, found none".into());
     };
     match format.as_u64() {
         Some(1..=FORMAT) => {}
         Some(format) => {
             let (version, own) = (shortened(version, SHOWN), curvelax_base::VERSION);
-            return refuse(format!(
-                ": expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: use a newer \
-                 one"
-            ));
+            let problem = format!(
+                "expected format {FORMAT} at most, found {format}, of curvelax {version}; this is {own}: use a newer one"
+            );
+            return refuse(&path, problem);
         }
         None => {
             let found = if format.is_null() { "none".into() } else { shortened(&format.to_string(), SHOWN) };
-            return refuse(format!(": expected a whole number from 1 under `format`, found {found}; {REMEDY}"));
+            return Err(spoilt(&path, "", &format!("expected a whole number from 1 under `format`, found {found}")));
         }
     }
     // From the text, not from the value, so that an error names its line.
-    let provenance: Provenance = match serde_json::from_str(&text) {
-        Ok(provenance) => provenance,
-        Err(e) => return refuse(no_json(e)),
-    };
+    let provenance: Provenance = parsed(&path, &text)?;
     match provenance.spec.clone().validate() {
         Ok(_) => Ok(provenance),
-        Err(e) => refuse(format!(", spec: {e}; {REMEDY}")),
+        Err(e) => Err(spoilt(&path, "spec", &e.to_string())),
     }
 }
 
@@ -252,10 +242,12 @@ impl<'a> Summary<'a> {
         if cell != own {
             return Err(fields.unexpected_in("cell", &format!("{own}, the cell of member {member}")));
         }
-        if self.spec_of.as_ref().is_none_or(|(of, _)| *of != cell) {
-            self.spec_of = Some((cell, self.spec.of_cell(cell)?));
-        }
-        let t_end = self.spec_of.as_ref().map_or(f64::INFINITY, |(_, spec)| spec.final_time());
+        let spec = match self.spec_of.take() {
+            Some((of, spec)) if of == cell => spec,
+            _ => self.spec.of_cell(cell)?,
+        };
+        let (_, spec) = self.spec_of.insert((cell, spec));
+        let t_end = spec.final_time();
         if outcome.t_relax.is_some_and(|t| t > t_end * (1.0 + LATE)) {
             return Err(fields.unexpected_in("t_relax", &format!("a time up to {t_end}, the end of the run")));
         }
@@ -265,7 +257,7 @@ impl<'a> Summary<'a> {
         outcome.events = rows.iter().map(EventTime::time).collect();
         let limits = rows.iter().map(|row| row.t_limit.zip(row.t_error));
         // The theoretical rate is in no table, since it follows from the spec and the rest of the row.
-        outcome.rate_theory = self.spec_of.as_ref().and_then(|(_, spec)| linear_rate::rate_of(spec, &outcome));
+        outcome.rate_theory = linear_rate::rate_of(spec, &outcome);
         let judged = |of: &Outcome| {
             [
                 ("t_limit", of.t_limit),
@@ -276,9 +268,7 @@ impl<'a> Summary<'a> {
             ]
         };
         let (told, points) = (judged(&outcome), outcome.points);
-        if let Some((_, spec)) = &self.spec_of {
-            self.levels.judge(spec, &mut outcome);
-        }
+        self.levels.judge(spec, &mut outcome);
         if let Some((found, _)) = judged(&outcome).into_iter().zip(told).find(|(found, told)| found != told) {
             let (value, file) = (found.1.map_or("nothing".into(), |t| t.to_string()), names::LEVELS);
             return Err(fields.unexpected_in(found.0, &format!("{value}, as {file} has it")));

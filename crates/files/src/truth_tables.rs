@@ -1,18 +1,19 @@
 //! The tables of `curvelax convergence`: errors against exact solutions and the referee, and what they cost.
 
-use super::{column::row, names};
+use super::{
+    column::{columns, row},
+    names,
+};
 use curvelax_study::truth::{ConvergenceRow, RefereeRow, WorkRow};
 
-row! {
-    /// A row of `convergence.csv`: the error of a run against an exact solution.
-    ErrorRow, names::CONVERGENCE:
-    problem: word, "name of the problem";
-    varied: word, "what is refined: n, tau or tolerance";
-    n: whole, "nodes";
-    tau: optional, "time step; empty where steps adapt";
-    tolerance: optional, "local error tolerance of adaptive steps";
-    error: optional, "measured / exact - 1; empty where the run ended early";
-    order: optional, "observed order against the row before";
+columns! { ConvergenceRow, names::CONVERGENCE:
+    problem: word = problem, "name of the problem";
+    varied: varied = varied, "what is refined: n, tau or tolerance";
+    n: nodes = at.n, "nodes";
+    tau: optional = at.tau, "time step; empty where steps adapt";
+    tolerance: optional = at.tolerance, "local error tolerance of adaptive steps";
+    error: optional = error, "measured / exact - 1; empty where the run ended early";
+    order: optional = order, "observed order against the row before";
 }
 
 row! {
@@ -30,33 +31,15 @@ row! {
     bars: optional, "(t - referee) / t_error";
 }
 
-row! {
-    /// A row of `work_precision.csv`: the error of relaxation times by one method, and what it costs.
-    CostRow, names::WORK:
-    solver: word, "solver of the systems";
-    tau: optional, "time step; empty where steps adapt";
-    tolerance: optional, "local error tolerance of adaptive steps";
-    most_order: whole, "highest order of the steps; 1 for fixed ones";
-    error: optional, "median of |t_relax / reference - 1|; empty unless all members relaxed";
-    solves: number, "steps of the paper per member, mean";
-    sweeps: number, "sweeps per member, mean";
-    seconds: number, "seconds per member with all threads at work, median of several runs";
-}
-
-impl ErrorRow {
-    /// The row of a run; either τ or the tolerance of adaptive steps is empty.
-    pub fn of(run: &ConvergenceRow) -> ErrorRow {
-        let ConvergenceRow { problem, varied, at, error, order, .. } = run;
-        ErrorRow {
-            problem: problem.clone(),
-            varied: varied.name().to_string(),
-            n: at.n as u64,
-            tau: at.tolerance.is_none().then_some(at.tau),
-            tolerance: at.tolerance,
-            error: *error,
-            order: *order,
-        }
-    }
+columns! { WorkRow, names::WORK:
+    solver: solver = solver, "solver of the systems";
+    tau: optional = stepping.tau, "time step; empty where steps adapt";
+    tolerance: optional = stepping.tolerance, "local error tolerance of adaptive steps";
+    most_order: small = stepping.most_order, "highest order of the steps; 1 for fixed ones";
+    error: optional = error, "median of |t_relax / reference - 1|; empty unless all members relaxed";
+    solves: number = solves, "steps of the paper per member, mean";
+    sweeps: number = sweeps, "sweeps per member, mean";
+    seconds: number = seconds, "seconds per member with all threads at work, median of several runs";
 }
 
 impl TruthRow {
@@ -78,23 +61,6 @@ impl TruthRow {
     }
 }
 
-impl CostRow {
-    /// The row of a method; either τ or the tolerance of adaptive steps is empty.
-    pub fn of(row: &WorkRow) -> CostRow {
-        let (tau, tolerance) = row.stepping.settings();
-        CostRow {
-            solver: row.solver.name().to_string(),
-            tau,
-            tolerance,
-            most_order: row.stepping.order().into(),
-            error: row.error,
-            solves: row.solves,
-            sweeps: row.sweeps,
-            seconds: row.seconds,
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,14 +72,12 @@ mod tests {
         let row = |error, order| ConvergenceRow {
             problem: "lemniscate".into(),
             varied: curvelax_study::truth::Varied::Step,
-            at: curvelax_study::truth::Resolution { n: 100, tau: 0.25, tolerance: None },
+            at: curvelax_study::truth::Resolution { n: 100, tau: Some(0.25), tolerance: None },
             status: Status::Unfinished,
             error,
             order,
         };
-        let text = written("convergence.csv", |file| {
-            Table::of(file, &[row(Some(-0.1), Some(1.5)), row(None, None)].map(|row| ErrorRow::of(&row)))
-        });
+        let text = written("convergence.csv", |file| Table::of(file, &[row(Some(-0.1), Some(1.5)), row(None, None)]));
         assert_eq!(
             text,
             "problem,varied,n,tau,tolerance,error,order\nlemniscate,tau,100,0.25,,-0.1,1.5\nlemniscate,tau,100,0.25,,,\n"

@@ -141,7 +141,7 @@ impl Figure {
     pub fn simulate(&self, spec: &Spec, progress: Progress) -> Result<Ended> {
         let family = Family::new(spec)?;
         let choice = placement::choose(spec)?;
-        let precision = choice.precision();
+        let precision = choice.precision;
         let (mut backend, _) = choice.open(spec)?;
         let mut only = Only { ended: None, progress };
         simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut only)?;

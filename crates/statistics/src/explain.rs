@@ -97,16 +97,8 @@ impl Regression {
         let (places, mut columns): (Vec<usize>, Vec<Vec<f64>>) = varying.unzip();
         columns.push(standardised(y)?);
         let parts = Products::of_parts(&columns, keys);
-        let mut all = Products::new(columns.len());
-        parts.iter().for_each(|part| all.add(part, 1.0));
-        let rest: Vec<Products> = parts
-            .iter()
-            .map(|part| {
-                let mut rest = all.clone();
-                rest.add(part, -1.0);
-                rest
-            })
-            .collect();
+        let all = parts.iter().fold(Products::new(columns.len()), |all, part| all.plus(part, 1.0));
+        let rest: Vec<Products> = parts.iter().map(|part| all.plus(part, -1.0)).collect();
         let least = rest.iter().map(|rest| rest.members() as usize).min()?;
         let most = (least / MEMBERS_PER_FEATURE).min(MAX_FEATURES).min(places.len());
         let paths: Vec<Vec<usize>> = rest.iter().map(|rest| rest.forward(most)).collect();
@@ -165,8 +157,10 @@ impl Products {
         parts
     }
 
-    fn add(&mut self, other: &Products, factor: f64) {
-        self.sums.iter_mut().zip(&other.sums).for_each(|(own, other)| *own += factor * other);
+    /// These and `factor` times the others.
+    fn plus(&self, other: &Products, factor: f64) -> Products {
+        let sums = self.sums.iter().zip(&other.sums).map(|(own, other)| own + factor * other).collect();
+        Products { size: self.size, sums }
     }
 
     fn at(&self, i: usize, j: usize) -> f64 {

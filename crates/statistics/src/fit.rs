@@ -1,10 +1,8 @@
 //! One quantity against another: the least-squares line, and the power law as a line of logarithms.
 
-use super::{
-    finite,
-    special::chi_square_tail,
-    sum::{Sum, mean},
-};
+use std::fmt::Debug;
+
+use super::{finite, special::chi_square_tail, sum::Sum};
 use curvelax_base::error::{Error, Result};
 
 /// y = intercept + slope·x, with the smallest sum of squared distances in y.
@@ -29,7 +27,12 @@ impl Line {
     /// x, or sums beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<Line>> {
         require(points, |(x, y)| x.is_finite() && y.is_finite(), "a straight line", "finite")?;
-        Ok(least_squares(points))
+        let even: Vec<(f64, f64, f64)> = points.iter().map(|(x, y)| (*x, *y, 1.0)).collect();
+        let with_error = |LeastSquares { line, xx, residual, degrees }| Line {
+            slope_error: (degrees > 0).then(|| (residual / degrees as f64 / xx).sqrt()).and_then(finite),
+            ..line
+        };
+        Ok(LeastSquares::of(&even).map(with_error))
     }
 
     /// Returns the line's y at x.
@@ -73,10 +76,9 @@ impl PowerLaw {
     /// An error names the first point that is not finite and positive. `None` if no exponent is defined: fewer than
     /// two different x, or a factor beyond the range of f64.
     pub fn fit(points: &[(f64, f64)]) -> Result<Option<PowerLaw>> {
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        require(points, |(x, y)| positive(x) && positive(y), "a power law", "finite and positive")?;
+        require(points, |(x, y)| [*x, *y].into_iter().all(is_positive), "a power law", "finite and positive")?;
         let logarithms: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-        Ok(least_squares(&logarithms).and_then(|line| PowerLaw::of(line, None)))
+        Ok(Line::fit(&logarithms)?.and_then(|line| PowerLaw::of(line, None)))
     }
 
     /// Fits a power law through points (x, y, standard error of ln y), in any order, weighted by 1 over the squared
@@ -84,19 +86,16 @@ impl PowerLaw {
     ///
     /// An error names the first point that is not finite and positive. `None` as for [`PowerLaw::fit`].
     pub fn weighted(points: &[(f64, f64, f64)]) -> Result<Option<PowerLaw>> {
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        let parts: Vec<(f64, f64)> = points.iter().flat_map(|(x, y, error)| [(*x, *y), (*error, *y)]).collect();
-        if let Some(i) = parts.iter().position(|(x, y)| !(positive(*x) && positive(*y))) {
-            return Err(refused(
-                "a power law",
-                "finite and positive",
-                i / 2,
-                points.len(),
-                &format!("{:?}", points[i / 2]),
-            ));
-        }
+        let good = |(x, y, error): &(f64, f64, f64)| [*x, *y, *error].into_iter().all(is_positive);
+        require(points, good, "a power law", "finite and positive")?;
         let weighted: Vec<_> = points.iter().map(|(x, y, error)| (x.ln(), y.ln(), error.powi(-2))).collect();
-        Ok(weighted_least_squares(&weighted).and_then(|(line, goodness)| PowerLaw::of(line, goodness)))
+        let law = |LeastSquares { line, xx, residual: statistic, degrees: degrees_of_freedom }| {
+            let p_value = chi_square_tail(statistic, degrees_of_freedom.max(1));
+            let goodness = GoodnessOfFit { statistic, degrees_of_freedom, p_value };
+            let line = Line { slope_error: finite(xx.sqrt().recip()), ..line };
+            PowerLaw::of(line, (degrees_of_freedom > 0).then_some(goodness))
+        };
+        Ok(LeastSquares::of(&weighted).and_then(law))
     }
 
     /// The law of a line of logarithms.
@@ -112,65 +111,50 @@ impl PowerLaw {
     }
 }
 
-fn require(points: &[(f64, f64)], good: impl Fn((f64, f64)) -> bool, fit: &str, asked: &str) -> Result<()> {
-    match points.iter().position(|point| !good(*point)) {
-        None => Ok(()),
-        Some(i) => Err(refused(fit, asked, i, points.len(), &format!("{:?}", points[i]))),
-    }
+fn is_positive(v: f64) -> bool {
+    v.is_finite() && v > 0.0
 }
 
-fn refused(fit: &str, asked: &str, i: usize, count: usize, point: &str) -> Error {
-    Error::Failed(format!(
-        "fit of {fit}: point {i} (from 0) of {count} is {point}; each number must be {asked}: leave the point out"
-    ))
+fn require<P: Debug>(points: &[P], good: impl Fn(&P) -> bool, fit: &str, asked: &str) -> Result<()> {
+    let Some(i) = points.iter().position(|point| !good(point)) else { return Ok(()) };
+    let (count, point) = (points.len(), &points[i]);
+    Err(Error::Failed(format!(
+        "fit of {fit}: point {i} (from 0) of {count} is {point:?}; each number must be {asked}: leave the point out"
+    )))
 }
 
-/// The line through points (x, y, weight), with its error from the weights, and how well it fits.
-fn weighted_least_squares(points: &[(f64, f64, f64)]) -> Option<(Line, Option<GoodnessOfFit>)> {
-    let sum = |term: &dyn Fn((f64, f64, f64)) -> f64| points.iter().map(|p| term(*p)).collect::<Sum>().value();
-    let weight = sum(&|(.., w)| w);
-    // From the first point, so that equal numbers have exactly their own mean.
-    let (x_first, y_first, _) = *points.first()?;
-    let x_mean = x_first + sum(&|(x, _, w)| w * (x - x_first)) / weight;
-    let y_mean = y_first + sum(&|(_, y, w)| w * (y - y_first)) / weight;
-    let about = |term: &dyn Fn(f64, f64) -> f64| sum(&|(x, y, w)| w * term(x - x_mean, y - y_mean));
-    let (xx, xy, yy) = (about(&|x, _| x * x), about(&|x, y| x * y), about(&|_, y| y * y));
-    if !(xx > 0.0 && [xx, xy, yy].iter().all(|sum| sum.is_finite())) {
-        return None;
-    }
-    let slope = finite(xy / xx)?;
-    let statistic = about(&|x, y| (y - slope * x).powi(2));
-    let degrees_of_freedom = points.len().saturating_sub(2);
-    let line = Line {
-        slope,
-        intercept: finite(y_mean - slope * x_mean)?,
-        r2: (yy > 0.0).then(|| (1.0 - statistic / yy).clamp(0.0, 1.0)),
-        slope_error: finite(xx.sqrt().recip()),
-        count: points.len(),
-    };
-    let p_value = chi_square_tail(statistic, degrees_of_freedom.max(1));
-    let goodness = GoodnessOfFit { statistic, degrees_of_freedom, p_value };
-    Some((line, (degrees_of_freedom > 0).then_some(goodness)))
+/// A line through weighted points, still without the error of its slope, and what that follows from.
+struct LeastSquares {
+    line: Line,
+    /// Weighted sum of the squared distances in x from the mean.
+    xx: f64,
+    /// The same in y from the line.
+    residual: f64,
+    /// Points less parameters.
+    degrees: usize,
 }
 
-fn least_squares(points: &[(f64, f64)]) -> Option<Line> {
-    let (x_mean, y_mean) = (mean(points.iter().map(|p| p.0))?, mean(points.iter().map(|p| p.1))?);
-    let about = || points.iter().map(|(x, y)| (x - x_mean, y - y_mean));
-    let of = |term: &dyn Fn((f64, f64)) -> f64| about().map(term).collect::<Sum>().value();
-    let (xx, xy, yy) = (of(&|(x, _)| x * x), of(&|(x, y)| x * y), of(&|(_, y)| y * y));
-    if !(xx > 0.0 && [xx, xy, yy].iter().all(|sum| sum.is_finite())) {
-        return None;
+impl LeastSquares {
+    /// The line through points (x, y, weight).
+    fn of(points: &[(f64, f64, f64)]) -> Option<LeastSquares> {
+        let sum = |term: &dyn Fn((f64, f64, f64)) -> f64| points.iter().map(|p| term(*p)).collect::<Sum>().value();
+        let weight = sum(&|(.., w)| w);
+        // From the first point, so that equal numbers have exactly their own mean.
+        let (x_first, y_first, _) = *points.first()?;
+        let x_mean = x_first + sum(&|(x, _, w)| w * (x - x_first)) / weight;
+        let y_mean = y_first + sum(&|(_, y, w)| w * (y - y_first)) / weight;
+        let about = |term: &dyn Fn(f64, f64) -> f64| sum(&|(x, y, w)| w * term(x - x_mean, y - y_mean));
+        let (xx, xy, yy) = (about(&|x, _| x * x), about(&|x, y| x * y), about(&|_, y| y * y));
+        if !(xx > 0.0 && [xx, xy, yy].iter().all(|sum| sum.is_finite())) {
+            return None;
+        }
+        let slope = finite(xy / xx)?;
+        let residual = about(&|x, y| (y - slope * x).powi(2));
+        let intercept = finite(y_mean - slope * x_mean)?;
+        let r2 = (yy > 0.0).then(|| (1.0 - residual / yy).clamp(0.0, 1.0));
+        let line = Line { slope, intercept, r2, slope_error: None, count: points.len() };
+        Some(LeastSquares { line, xx, residual, degrees: points.len().saturating_sub(2) })
     }
-    let slope = finite(xy / xx)?;
-    let residual = of(&|(x, y)| (y - slope * x).powi(2));
-    let degrees = points.len().saturating_sub(2);
-    Some(Line {
-        slope,
-        intercept: finite(y_mean - slope * x_mean)?,
-        r2: (yy > 0.0).then(|| (1.0 - residual / yy).clamp(0.0, 1.0)),
-        slope_error: (degrees > 0).then(|| (residual / degrees as f64 / xx).sqrt()).and_then(finite),
-        count: points.len(),
-    })
 }
 
 #[cfg(test)]

@@ -190,7 +190,7 @@ fn first(laws: impl Iterator<Item = (f64, BetaProduct)>, level: f64, share: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{HALF_INTERVAL, KaplanMeier};
+    use crate::HALF_INTERVAL;
     use curvelax_base::random::Stream;
 
     const SHARES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -312,7 +312,7 @@ mod tests {
     /// Where S is within 1.96 of Greenwood's standard errors of ½.
     fn normal_interval(sample: &Sample) -> Interval {
         let near = |step: &crate::Step| (step.survival - 0.5).abs() <= HALF_INTERVAL * step.variance.sqrt();
-        let steps: Vec<_> = KaplanMeier::new(sample).steps().collect();
+        let steps: Vec<_> = sample.steps().collect();
         let lower = steps.iter().find(|step| near(step) || step.survival < 0.5).map(|step| step.time);
         let upper = steps.iter().find(|step| step.survival < 0.5 && !near(step)).map(|step| step.time);
         Interval { lower, upper, ..WIDE }

@@ -24,24 +24,22 @@
 //!
 //! # Practice
 //!
-//! A [`Sample`] is checked and sorted once; [`KaplanMeier`], [`interval`] and [`log_rank`] read it and cannot fail. A
+//! A [`Sample`] is checked and sorted once; its survival, [`interval`] and [`log_rank`] follow and cannot fail. A
 //! [`Description`] is for complete data, [`Line`] and [`PowerLaw`] for one quantity against another. Unknown values are
-//! `None`, never NaN and never infinite, and [`Caveat`] says why. Times may be in any one unit; means, deviations and
-//! quantiles have the same unit, variances of S have none.
+//! `None`, never NaN and never infinite. Times may be in any one unit; means, deviations and quantiles have the same
+//! unit, variances of S have none.
 
 //!
 //! # Example
 //!
 //! ```
-//! use curvelax_statistics::{KaplanMeier, Observation, Sample, interval};
+//! use curvelax_statistics::{Observation, Sample, interval};
 //!
 //! let relaxed = [0.8, 0.5, 1.1, 0.9].map(|t| Observation::new(Some(t), 2.0));
 //! let unfinished = Observation::new(None, 2.0);
 //! let sample = Sample::new(relaxed.into_iter().chain([unfinished]))?;
-//! let curve = KaplanMeier::new(&sample);
-//! assert_eq!((curve.median(), curve.quantile(0.95)), (Some(0.9), None));
-//! assert_eq!(curve.mean().unwrap().restricted_to, Some(2.0));
-//! println!("{}", curve.caveat().unwrap());
+//! assert_eq!((sample.median(), sample.quantile(0.95)), (Some(0.9), None));
+//! assert_eq!(sample.mean().unwrap().restricted_to, Some(2.0));
 //! let interval = interval::of_sample(&sample, 0.5).unwrap();
 //! assert_eq!((interval.lower, interval.upper), (Some(0.5), None));
 //! # Ok::<(), curvelax_base::Error>(())
@@ -71,7 +69,7 @@ pub use log_rank::{GroupEvents, LogRank, log_rank};
 pub use paired::{PairedDifferences, SignedRank};
 pub use sample::{Observation, Observations, Sample};
 pub use spread::Spread;
-pub use survival::{Caveat, KaplanMeier, Mean, Step};
+pub use survival::{Mean, Step};
 
 /// Standard errors in half a 95 % interval of a normal estimate.
 pub const HALF_INTERVAL: f64 = 1.96;

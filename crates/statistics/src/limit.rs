@@ -165,25 +165,13 @@ impl Limit {
     /// # Panics
     /// With fewer than three levels.
     pub fn of(times: &Times) -> Limit {
-        let Times {
-            of,
-            own,
-            ref levels,
-            ref points,
-            ref rounding,
-            own_level,
-            tolerance,
-            share_of_steps,
-            turn,
-            length,
-            excess,
-            terms,
-        } = *times;
+        let Times { levels, points, rounding, .. } = times;
+        let &Times { of, own, tolerance, share_of_steps, terms, .. } = times;
         let finest = points[points.len() - 1];
         let of_three = |from: usize| {
             let at = [0, 1, 2].map(|i| from + i);
             let (points, rounding) = (at.map(|i| points[i]), at.map(|i| rounding[i] * levels[i]));
-            let (turn, spacing) = (turn * finest as f64 / points[2] as f64, length / points[2] as f64);
+            let (turn, spacing) = (times.turn * finest as f64 / points[2] as f64, times.length / points[2] as f64);
             OfSpace::of(at.map(|i| levels[i]), points, rounding, Nodes { of, terms, turn, spacing })
         };
         let of_space: Vec<OfSpace> = (0..levels.len() - 2).rev().map(of_three).collect();
@@ -200,10 +188,10 @@ impl Limit {
             _ => error,
         };
         let full = levels[levels.len() - 1];
-        let change = if share_of_steps.is_some() { own - levels[own_level] } else { 0.0 };
+        let change = if share_of_steps.is_some() { own - levels[times.own_level] } else { 0.0 };
         let t = t - change / (FINER_STEPS - 1.0);
         let of_steps = share_of_steps.unwrap_or(0.0) * change;
-        let error = error.hypot(of_steps).hypot(OF_TOLERANCE * tolerance * full / excess.sqrt()).hypot(rounding);
+        let error = error.hypot(of_steps).hypot(OF_TOLERANCE * tolerance * full / times.excess.sqrt()).hypot(rounding);
         Limit { t, error, fixed: rounding, order, asymptotic, relative: own / t - 1.0 }
     }
 

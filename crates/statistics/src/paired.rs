@@ -11,6 +11,7 @@
 //! included, since twice a rank is a whole number. For more it is normal, with a continuity correction of ½.
 
 use super::{
+    describe::quantile,
     interval::Ranks,
     special::{LEAST, normal_tails},
 };
@@ -19,11 +20,20 @@ use curvelax_base::error::{Error, Result};
 /// Maximum number of differences for which all signs are counted: 2⁵⁰ is exact in f64.
 const MAX_EXACT: usize = 50;
 
-/// Differences of pairs, sorted.
-#[derive(Clone, Debug, PartialEq)]
+/// What the differences of pairs say.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairedDifferences {
-    sorted: Vec<f64>,
-    test: Option<SignedRank>,
+    /// Number of pairs.
+    pub pairs: usize,
+    /// Of these, pairs without a difference.
+    pub equal: usize,
+    /// The median: the middle difference, or the mean of the two in the middle.
+    pub median: Option<f64>,
+    /// The 95 % interval of the median, by the ranks of the sign test. `None` below 6 pairs, for which none is that
+    /// sure, and if all differences are equal, which are no draws.
+    pub interval: Option<(f64, f64)>,
+    /// The signed-rank test; `None` if all differences are equal: copies of one pair are not several.
+    pub test: Option<SignedRank>,
 }
 
 /// Result of the signed-rank test.
@@ -40,52 +50,27 @@ pub struct SignedRank {
 }
 
 impl PairedDifferences {
-    /// Tests and sorts differences in any order.
+    /// Those of differences in any order.
     ///
     /// An error names the first that is not finite.
     pub fn new(mut differences: Vec<f64>) -> Result<PairedDifferences> {
+        let pairs = differences.len();
         if let Some(i) = differences.iter().position(|difference| !difference.is_finite()) {
             return Err(Error::Failed(format!(
-                "statistics of pairs: difference {i} (from 0) of {} is {}; only finite ones can be ranked: leave the \
+                "statistics of pairs: difference {i} (from 0) of {pairs} is {}; only finite ones can be ranked: leave the \
                  pair out",
-                differences.len(),
                 differences[i]
             )));
         }
         differences.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
-        let zeros = differences.partition_point(|difference| *difference == 0.0);
+        let equal = differences.partition_point(|difference| *difference == 0.0);
         let alike = differences.iter().all(|difference| *difference == differences[0]);
-        let test = if alike { None } else { signed_rank(&differences[zeros..]) };
+        let test = if alike { None } else { signed_rank(&differences[equal..]) };
         differences.sort_unstable_by(f64::total_cmp);
-        Ok(PairedDifferences { sorted: differences, test })
-    }
-
-    /// Returns the number of pairs.
-    pub fn count(&self) -> usize {
-        self.sorted.len()
-    }
-
-    /// Returns the number of pairs without a difference.
-    pub fn zeros(&self) -> usize {
-        self.sorted.iter().filter(|difference| **difference == 0.0).count()
-    }
-
-    /// Returns the median: the middle difference, or the mean of the two in the middle.
-    pub fn median(&self) -> Option<f64> {
-        super::describe::quantile(&self.sorted, 0.5)
-    }
-
-    /// Returns the 95 % interval of the median, by the ranks of the sign test. `None` below 6 pairs, for which none is
-    /// that sure, and if all differences are equal, which are no draws.
-    pub fn interval(&self) -> Option<(f64, f64)> {
-        let Ranks { lower, upper, .. } = Ranks::new(self.count(), 0.5)?;
-        self.test?;
-        Some((self.sorted[lower? - 1], self.sorted[upper? - 1]))
-    }
-
-    /// Returns the signed-rank test; `None` if all differences are equal: copies of one pair are not several.
-    pub fn test(&self) -> Option<SignedRank> {
-        self.test
+        let ranks = Ranks::new(pairs, 0.5).filter(|_| test.is_some());
+        let interval =
+            ranks.and_then(|Ranks { lower, upper, .. }| Some((differences[lower? - 1], differences[upper? - 1])));
+        Ok(PairedDifferences { pairs, equal, median: quantile(&differences, 0.5), interval, test })
     }
 }
 
@@ -175,14 +160,14 @@ mod tests {
             &[1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, 9.5, 10.5, 11.5, -0.5],
         ];
         for differences in samples {
-            let test = of(differences).test().unwrap();
+            let test = of(differences).test.unwrap();
             let expected = by_all_signs(differences);
             assert!(
                 test.exact && (test.p_value / expected - 1.0).abs() < 1e-12,
                 "{differences:?}: {test:?} {expected}"
             );
         }
-        assert_ne!(of(samples[1]).test(), of(&samples[1][1..]).test(), "blind");
+        assert_ne!(of(samples[1]).test, of(&samples[1][1..]).test, "blind");
     }
 
     #[test]
@@ -191,9 +176,9 @@ mod tests {
             let differences = |n: i32| -> Vec<f64> {
                 (1..=n).map(|i| f64::from(i) * if i % share == 0 { -1.0 } else { 1.0 }).collect()
             };
-            let exact = of(&differences(50)).test().unwrap();
+            let exact = of(&differences(50)).test.unwrap();
             let by_size: Vec<f64> = differences(51);
-            let normal = of(&by_size).test().unwrap();
+            let normal = of(&by_size).test.unwrap();
             assert!(exact.exact && !normal.exact);
             let counted = {
                 let positive: f64 = by_size.iter().filter(|d| **d > 0.0).sum();
@@ -208,7 +193,7 @@ mod tests {
     fn ties_narrow_the_distribution() {
         // By hand: 60 differences of one size have the rank 30.5 each, so W⁺ is 30.5 times a binomial number.
         let differences: Vec<f64> = (0..60).map(|i| if i < 20 { -1.0 } else { 1.0 }).collect();
-        let test = of(&differences).test().unwrap();
+        let test = of(&differences).test.unwrap();
         let deviation = 30.5 * 15.0_f64.sqrt();
         assert_eq!((test.statistic, test.ranked), (40.0 * 30.5, 60));
         assert!((test.p_value / normal_tails((10.0 * 30.5 - 0.5) / deviation) - 1.0).abs() < 1e-12, "{test:?}");
@@ -219,25 +204,25 @@ mod tests {
         let differences: Vec<f64> =
             (0..512).map(|i| 1e-6 * (1.0 + f64::from(i % 17)) * (1.0 + 1e-3 * f64::from(i))).collect();
         let found = of(&differences);
-        assert!(found.test().unwrap().p_value < 1e-80, "{:?}", found.test());
+        assert!(found.test.unwrap().p_value < 1e-80, "{:?}", found.test);
         let mixed: Vec<f64> = differences.iter().zip([1.0, -1.0].iter().cycle()).map(|(d, sign)| d * sign).collect();
-        assert!(of(&mixed).test().unwrap().p_value > 0.1, "{:?}", of(&mixed).test());
+        assert!(of(&mixed).test.unwrap().p_value > 0.1, "{:?}", of(&mixed).test);
     }
 
     #[test]
     fn the_interval_of_the_median_has_the_ranks_of_the_sign_test() {
-        assert_eq!(of(&[1.0, 2.0, 3.0, 4.0, 5.0]).interval(), None);
+        assert_eq!(of(&[1.0, 2.0, 3.0, 4.0, 5.0]).interval, None);
         let ten = of(&[10.0, 2.0, 3.0, 1.0, 5.0, 4.0, 7.0, 9.0, 8.0, 6.0]);
-        assert_eq!((ten.median(), ten.interval()), (Some(5.5), Some((2.0, 9.0))));
+        assert_eq!((ten.median, ten.interval), (Some(5.5), Some((2.0, 9.0))));
     }
 
     #[test]
     fn copies_and_nothing_are_not_tested() {
         for (differences, median) in [(&[][..], None), (&[0.0; 9][..], Some(0.0)), (&[0.25; 99][..], Some(0.25))] {
             let found = of(differences);
-            assert_eq!((found.median(), found.interval(), found.test()), (median, None, None), "{differences:?}");
+            assert_eq!((found.median, found.interval, found.test), (median, None, None), "{differences:?}");
         }
-        assert_eq!((of(&[0.0, 1.0, 0.0]).zeros(), of(&[0.0, 1.0, 0.0]).test().unwrap().p_value), (2, 1.0));
+        assert_eq!((of(&[0.0, 1.0, 0.0]).equal, of(&[0.0, 1.0, 0.0]).test.unwrap().p_value), (2, 1.0));
         let message = PairedDifferences::new(vec![1.0, f64::NAN]).unwrap_err().to_string();
         assert!(message.contains("difference 1 (from 0) of 2 is NaN"), "{message}");
     }

@@ -1,8 +1,6 @@
 //! The product-limit estimate of Kaplan and Meier: the fraction of members without an event so far, with its
 //! quantiles and its mean.
 
-use std::fmt;
-
 use super::{
     HALF_INTERVAL, finite,
     sample::{ProductLimit, ROUNDING, Sample, reaches},
@@ -51,25 +49,15 @@ pub struct Mean {
     pub restricted_to: Option<f64>,
 }
 
-/// An estimate of the survival function, a right-continuous step function from S = 1.
+/// The estimate of the survival function, a right-continuous step function from S = 1.
 ///
 /// Nothing is stored next to the sample: each number passes through it once or twice.
-#[derive(Clone, Copy, Debug)]
-pub struct KaplanMeier<'a> {
-    sample: &'a Sample,
-}
-
-impl<'a> KaplanMeier<'a> {
-    /// Creates the estimate from any sample, even an empty one.
-    pub fn new(sample: &'a Sample) -> KaplanMeier<'a> {
-        KaplanMeier { sample }
-    }
-
+impl Sample {
     /// Iterates over the steps of S, in order of time.
-    pub fn steps(&self) -> impl Iterator<Item = Step> + 'a {
-        let mut limit = ProductLimit::new(self.sample.len());
-        let mut left = self.sample.len();
-        self.sample.times().filter_map(move |(time, events, censored)| {
+    pub fn steps(&self) -> impl Iterator<Item = Step> + '_ {
+        let mut limit = ProductLimit::new(self.len());
+        let mut left = self.len();
+        self.times().filter_map(move |(time, events, censored)| {
             let at_risk = left;
             limit.events(events);
             let (survival, variance) = (limit.survival(), limit.variance());
@@ -77,21 +65,6 @@ impl<'a> KaplanMeier<'a> {
             left -= events + censored;
             (events > 0).then_some(Step { time, at_risk, events, survival, variance })
         })
-    }
-
-    /// Returns the number of members.
-    pub fn members(&self) -> usize {
-        self.sample.len()
-    }
-
-    /// Returns the number of members with an event.
-    pub fn events(&self) -> usize {
-        self.sample.events()
-    }
-
-    /// Returns the largest time, censored or not, up to which S is known.
-    pub fn last(&self) -> Option<f64> {
-        self.sample.last()
     }
 
     /// Returns S(t), the fraction of members without an event by the time t; beyond the largest time its last value.
@@ -112,7 +85,7 @@ impl<'a> KaplanMeier<'a> {
         self.steps().find(|step| reaches(step.survival, 1.0 - p)).map(|step| step.time)
     }
 
-    /// Returns the [quantiles](KaplanMeier::quantile) of ascending fractions, in one pass, up to the first that is
+    /// Returns the [quantiles](Sample::quantile) of ascending fractions, in one pass, up to the first that is
     /// unknown.
     pub fn quantiles(&self, ascending: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let mut steps = self.steps().peekable();
@@ -156,10 +129,10 @@ impl<'a> KaplanMeier<'a> {
         area.add(survival * (last - before));
         let value = first + mean.value();
         let [variance, area_variance] = self.variances(value, area);
-        let n = self.members() as f64;
+        let n = self.len() as f64;
         let [deviation, error] = if self.has_single_event() {
             [None, None]
-        } else if self.sample.censored() > 0 {
+        } else if self.censored() > 0 {
             [variance, area_variance].map(Some)
         } else {
             [variance * (n / (n - 1.0)), variance / (n - 1.0)].map(Some)
@@ -197,80 +170,6 @@ impl<'a> KaplanMeier<'a> {
     fn has_single_event(&self) -> bool {
         self.events() == 1 && self.steps().all(|step| step.survival == 0.0)
     }
-
-    /// Returns what a reader must know before using the numbers, if anything.
-    pub fn caveat(&self) -> Option<Caveat> {
-        let (members, censored) = (self.members(), self.sample.censored());
-        let survival = self.steps().last().map_or(1.0, |step| step.survival);
-        match self.last() {
-            None => Some(Caveat::NoMembers),
-            Some(last) if self.events() == 0 => Some(Caveat::AllCensored { members, last }),
-            Some(_) if self.has_single_event() => Some(Caveat::SingleEvent { members }),
-            Some(last) if survival > 0.0 => Some(Caveat::TailCensored { members, censored, last, survival }),
-            Some(_) => None,
-        }
-    }
-}
-
-/// Why numbers are missing, or differ from their names; `Display` gives a sentence.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Caveat {
-    /// The sample is empty.
-    NoMembers,
-    /// A single event, at which S falls from 1 to 0.
-    SingleEvent {
-        /// Number of members.
-        members: usize,
-    },
-    /// No event at all.
-    AllCensored {
-        /// Number of members.
-        members: usize,
-        /// The largest time.
-        last: f64,
-    },
-    /// The last member or members are censored, so S does not come down to 0.
-    TailCensored {
-        /// Number of members.
-        members: usize,
-        /// Number of those whose time is censored.
-        censored: usize,
-        /// The largest time.
-        last: f64,
-        /// S there.
-        survival: f64,
-    },
-}
-
-impl fmt::Display for Caveat {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Caveat::NoMembers => write!(f, "no members, so there is nothing to estimate"),
-            Caveat::SingleEvent { members } => {
-                write!(
-                    f,
-                    "a single event ({members} members): no standard deviation and no standard error can be \
-                           estimated"
-                )
-            }
-            Caveat::AllCensored { members, last } => write!(
-                f,
-                "all {members} members are censored, the last at {last}: no mean and no quantile can be estimated \
-                 before some have their event"
-            ),
-            Caveat::TailCensored { members, censored, last, survival } => write!(
-                f,
-                "{censored} of {members} members are censored, and S ends at {} at the time {last}: the mean is that \
-                 of times cut off there, a lower bound, and quantiles above 1 - S are not known",
-                significant(survival)
-            ),
-        }
-    }
-}
-
-/// Rounded to four digits.
-fn significant(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 #[cfg(test)]
@@ -279,12 +178,12 @@ mod tests {
     use crate::Observation;
 
     /// Times with `+` for censored.
-    fn curve(times: &str) -> KaplanMeier<'static> {
+    fn curve(times: &str) -> Sample {
         let seen = |word: &str| Observation {
             time: word.trim_end_matches('+').parse().unwrap(),
             happened: !word.ends_with('+'),
         };
-        KaplanMeier::new(Box::leak(Box::new(Sample::new(times.split_whitespace().map(seen)).unwrap())))
+        Sample::new(times.split_whitespace().map(seen)).unwrap()
     }
 
     #[test]
@@ -312,8 +211,7 @@ mod tests {
     #[test]
     fn quantiles_in_one_pass_are_those_one_by_one_up_to_the_first_that_is_unknown() {
         let times = (1..40_u32).map(|i| Observation { time: f64::from(i * i), happened: i % 7 > 0 && i < 35 });
-        let sample = Sample::new(times).unwrap();
-        let survival = KaplanMeier::new(&sample);
+        let survival = Sample::new(times).unwrap();
         let shares: Vec<f64> = (0..50).map(|i| (f64::from(i) + 0.5) / 50.0).collect();
         let one_by_one: Vec<f64> = shares.iter().map_while(|share| survival.quantile(*share)).collect();
         assert!(one_by_one.len() > 30 && one_by_one.len() < 50, "{}", one_by_one.len());
@@ -334,21 +232,18 @@ mod tests {
     }
 
     #[test]
-    fn no_members_have_no_numbers_and_a_sentence() {
+    fn no_members_have_no_numbers() {
         let none = curve("");
         assert_eq!((none.median(), none.mean(), none.last(), none.survival(1.0)), (None, None, None, 1.0));
-        assert_eq!(none.caveat(), Some(Caveat::NoMembers));
     }
 
     #[test]
     fn one_member_has_a_mean_and_nothing_about_its_spread() {
         let one = curve("0.3");
         let mean = Mean { value: 0.3, standard_deviation: None, standard_error: None, restricted_to: None };
-        let caveat = Caveat::SingleEvent { members: 1 };
-        assert_eq!((one.median(), one.mean(), one.caveat()), (Some(0.3), Some(mean), Some(caveat)));
+        assert_eq!((one.median(), one.mean()), (Some(0.3), Some(mean)));
         // Nor does it if others were censored before.
-        let last = curve("0.1+ 0.3");
-        assert_eq!((last.mean(), last.caveat()), (Some(mean), Some(Caveat::SingleEvent { members: 2 })));
+        assert_eq!(curve("0.1+ 0.3").mean(), Some(mean));
     }
 
     #[test]
@@ -356,7 +251,6 @@ mod tests {
         for times in ["0.5+", "0.5+ 0.25+ 0.5+"] {
             let all = curve(times);
             assert!(all.mean().is_none() && all.median().is_none() && all.steps().next().is_none());
-            assert_eq!(all.caveat(), Some(Caveat::AllCensored { members: all.members(), last: 0.5 }));
         }
     }
 
@@ -386,17 +280,10 @@ mod tests {
         let mean = cut.mean().unwrap();
         assert_eq!((mean.value, mean.standard_deviation, mean.restricted_to), (1.5, Some(0.5), Some(2.0)));
         assert_eq!(mean.standard_error, Some(0.125_f64.sqrt()));
-        let caveat = cut.caveat().unwrap();
-        assert_eq!(caveat, Caveat::TailCensored { members: 2, censored: 1, last: 2.0, survival: 0.5 });
-        assert_eq!(
-            caveat.to_string(),
-            "1 of 2 members are censored, and S ends at 0.5 at the time 2: the mean is that of times cut off there, a \
-             lower bound, and quantiles above 1 - S are not known"
-        );
         // The censored member counts through those that outlast it.
         let whole = curve("1+ 2 3");
         let mean = whole.mean().unwrap();
-        assert_eq!((mean.value, mean.restricted_to, whole.caveat()), (2.5, None, None));
+        assert_eq!((mean.value, mean.restricted_to), (2.5, None));
         assert_eq!(mean.standard_error, Some(0.125_f64.sqrt()));
     }
 

@@ -68,13 +68,16 @@ impl Platform {
 /// A back end that suits a spec, not yet opened.
 #[derive(Clone)]
 pub struct ChosenBackend {
-    device: Device,
+    /// The device.
+    pub device: Device,
     /// Its number, if it was requested by number.
-    number: Option<String>,
-    /// Whether to use the CPU if the GPU cannot be opened.
-    or_cpu: bool,
-    precision: Precision,
-    reason: String,
+    pub number: Option<String>,
+    /// Whether the CPU takes over if the GPU cannot be opened or computes wrongly, since that GPU was not requested.
+    pub or_cpu: bool,
+    /// Number type of the run.
+    pub precision: Precision,
+    /// Why it was chosen.
+    pub reason: String,
 }
 
 /// Chooses the back end for the members of a spec.
@@ -150,7 +153,7 @@ fn auto(spec: &Spec, adapters: Vec<Gpu>) -> Result<ChosenBackend> {
     for adapter in adapters.into_iter().filter(Gpu::is_hardware) {
         let name = adapter.name().to_string();
         match take(spec, adapter, format!("hardware GPU {name}")) {
-            Ok(choice) => return Ok(choice.or_cpu()),
+            Ok(choice) => return Ok(ChosenBackend { or_cpu: true, ..choice }),
             Err(error) => reason = format!("GPU {name} cannot do it: {error}"),
         }
     }
@@ -263,11 +266,6 @@ impl ChosenBackend {
         Some(format!("{} is a software GPU, and the CPU back end is faster: use --backend cpu", gpu.name()))
     }
 
-    /// Returns the number type of the run.
-    pub fn precision(&self) -> Precision {
-        self.precision
-    }
-
     /// Returns whether the members are advanced by software that acts as a GPU.
     pub fn is_software_gpu(&self) -> bool {
         self.device.gpu().is_some_and(|gpu| !gpu.is_hardware())
@@ -342,39 +340,11 @@ impl ChosenBackend {
         ChosenBackend { device: Device::Cpu, number: None, or_cpu: false, precision: self.precision, reason }
     }
 
-    /// Falls back to the CPU if the GPU cannot be opened or computes wrongly.
-    pub fn or_cpu(self) -> ChosenBackend {
-        ChosenBackend { or_cpu: true, ..self }
-    }
-
-    /// Returns whether the CPU may take over from the GPU, since that GPU was not requested.
-    pub fn may_fall_back(&self) -> bool {
-        self.or_cpu
-    }
-
-    /// Replaces the reason of the choice.
-    pub fn because(self, reason: String) -> ChosenBackend {
-        ChosenBackend { reason, ..self }
-    }
-
-    /// Returns the chosen device.
-    pub fn device(&self) -> &Device {
-        &self.device
-    }
-
-    /// Opens the device for a cohort of cells.
-    ///
-    /// # Errors
-    /// As [`open`](ChosenBackend::open).
-    pub fn open_for(&self, cohort: &[Cell]) -> Result<(Box<dyn Backend>, Platform)> {
-        self.open_watched(cohort, &OpeningWatch::default())
-    }
-
-    /// Like [`open_for`](ChosenBackend::open_for), under the eyes of `watch`, which receives what is opened.
+    /// Opens the device for a cohort of cells, under the eyes of `watch`, which receives what is opened.
     ///
     /// # Errors
     /// As [`open`](ChosenBackend::open), and that of the watch.
-    pub fn open_watched(&self, cohort: &[Cell], watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
+    pub fn open_for(&self, cohort: &[Cell], watch: &OpeningWatch) -> Result<(Box<dyn Backend>, Platform)> {
         (watch.tell)(&self.sentence(&cohort[0].spec));
         let curves = cohort.iter().map(|cell| cell.spec.member_count()).sum();
         let whole = Spec { curves, only: None, shard: None, ..cohort[0].spec.clone() };

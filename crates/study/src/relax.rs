@@ -1,6 +1,6 @@
 //! The library's entry point: runs a study and passes on what its members leave.
 
-use crate::placement::{Platform, choose_all};
+use crate::placement::{OpeningWatch, Platform, choose_all};
 use curvelax_base::error::Result;
 use curvelax_ensemble::{LevelSink, LevelTimes, Sink, Study, simulate::simulate};
 
@@ -27,9 +27,9 @@ use curvelax_ensemble::{LevelSink, LevelTimes, Sink, Study, simulate::simulate};
 /// [`Error::Device`](curvelax_base::error::Error::Device) if a requested GPU fails, and the errors of the sink.
 pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
     let (stages, choices) = (study.stages(), choose_all(study)?);
-    let own = study.own_stage();
+    let (own, watch) = (study.own_stage(), OpeningWatch::default());
     // Where it is computed depends on whether this device can be opened.
-    let (first, platform) = choices[own].open_for(&study.cells()[stages[own].range.clone()])?;
+    let (first, platform) = choices[own].open_for(&study.cells()[stages[own].range.clone()], &watch)?;
     let (mut first, mut levels) = (Some(first), LevelTimes::default());
     for (i, (stage, choice)) in stages.iter().zip(choices).enumerate() {
         let cells = study.cells_of(stage, &levels)?;
@@ -42,7 +42,7 @@ pub fn relax(study: &Study, sink: &mut dyn Sink) -> Result<Platform> {
             None => {
                 // A study does not change device midway.
                 let choice = choice.after(&platform);
-                (choice.open_for(&cells)?.0, choice.precision())
+                (choice.open_for(&cells, &watch)?.0, choice.precision)
             }
         };
         let mut sink = LevelSink { level: stage.level, precision, cells: &cells, levels: &mut levels, sink };

@@ -345,7 +345,7 @@ fn a_cap_of_one_sweep(gpu: &Gpu) -> Outcome {
     // The run has the cap that it asked for.
     let mut all = Vec::new();
     let cell = Cell::only(spec.clone(), Family::new(&spec)?);
-    simulate(&[cell], choice.precision(), backend.as_mut(), 0, &mut all)?;
+    simulate(&[cell], choice.precision, backend.as_mut(), 0, &mut all)?;
     require(all.len() == 3, || format!("{} members", all.len()))?;
     let sweeps = |ended: &Ended| ended.outcome.sweeps_k <= ended.outcome.solves;
     require(all.iter().all(sweeps), || format!("{:?}", all[0].outcome))
@@ -357,15 +357,15 @@ fn lost_before(gpu: &Gpu) -> Outcome {
         .validate()?;
     let choice = || -> Result<placement::ChosenBackend, Failed> {
         let choice = placement::choose(&spec)?;
-        let gpu = choice.device().gpu().ok_or("no GPU")?;
+        let gpu = choice.device.gpu().ok_or("no GPU")?;
         let blocks = Blocks::new(spec.points).ok_or("n")?;
         let _ = gpu.pipeline::<f64>(blocks, gpu.capacity().variant(blocks, spec.solver()))?;
         gpu.lose();
         Ok(choice)
     };
     named(choice()?.open(&spec), gpu, "the device was lost")?;
-    let choice = choice()?.or_cpu();
-    let precision = choice.precision();
+    let choice = placement::ChosenBackend { or_cpu: true, ..choice()? };
+    let precision = choice.precision;
     let (mut backend, platform) = choice.open(&spec)?;
     let told = platform.reason.starts_with("the GPU failed: ") && platform.reason.contains("the device was lost");
     require(platform.backend == DeviceKind::Cpu && platform.adapter.is_none() && told, || format!("{platform:?}"))?;
@@ -377,16 +377,20 @@ fn lost_before(gpu: &Gpu) -> Outcome {
     simulate(&[Cell::only(spec.clone(), family)], precision, backend.as_mut(), 0, &mut all)?;
     require(all.len() == 3, || format!("{} members", all.len()))?;
     // A later part of the same study makes the same choice, and one of a study on a GPU stays there.
-    let later = choice_like(&spec)?.or_cpu().after(&platform);
-    require(later.device().gpu().is_none(), || "a later part goes back to the GPU".into())?;
+    let later = or_cpu(&spec)?.after(&platform);
+    require(later.device.gpu().is_none(), || "a later part goes back to the GPU".into())?;
     let (_, there) = choice_like(&spec)?.open(&spec)?;
     require(there.backend == DeviceKind::Gpu, || format!("{there:?}"))?;
-    let later = choice_like(&spec)?.or_cpu().after(&there);
-    let own = later.device().gpu().ok_or("no GPU")?;
+    let later = or_cpu(&spec)?.after(&there);
+    let own = later.device.gpu().ok_or("no GPU")?;
     let blocks = Blocks::new(spec.points).ok_or("n")?;
     let _ = own.pipeline::<f64>(blocks, own.capacity().variant(blocks, spec.solver()))?;
     own.lose();
     named(later.open(&spec), gpu, "the device was lost")
+}
+
+fn or_cpu(spec: &Spec) -> curvelax::Result<placement::ChosenBackend> {
+    Ok(placement::ChosenBackend { or_cpu: true, ..choice_like(spec)? })
 }
 
 fn choice_like(spec: &Spec) -> curvelax::Result<placement::ChosenBackend> {

@@ -35,21 +35,7 @@ use crate::{
 const MAX_CHOICES: usize = 1000;
 /// Maximum values, one for each member.
 const MAX_VALUES: usize = 100_000;
-/// The names of the distributions.
-pub const NAMES: [&str; 11] = [
-    "uniform",
-    "loguniform",
-    "normal",
-    "lognormal",
-    "halfnormal",
-    "gamma",
-    "weibull",
-    "choice",
-    "each",
-    "empirical",
-    "table",
-];
-/// What each needs.
+/// The distributions, with what each needs.
 const USAGE: &str = "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal(MEDIAN,SIGMA), halfnormal(SD), \
                      gamma(SHAPE,SCALE), weibull(SHAPE,SCALE), choice(A,B,...), each(A,B,...), empirical(A,B,...), \
                      table(FILE,COLUMN); continuous ones also as DISTRIBUTION in A..B";
@@ -57,53 +43,22 @@ const USAGE: &str = "uniform(A..B), loguniform(A..B), normal(MEAN,SD), lognormal
 /// The law of one number.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Distribution {
-    /// Any number between two, all equally probable.
-    Uniform {
-        /// The smallest.
-        low: f64,
-        /// The largest.
-        high: f64,
-    },
-    /// A number whose logarithm is uniform.
-    LogUniform {
-        /// The smallest, above 0.
-        low: f64,
-        /// The largest.
-        high: f64,
-    },
-    /// The normal law.
-    Normal {
-        /// Its mean.
-        mean: f64,
-        /// Its standard deviation, above 0.
-        sd: f64,
-    },
-    /// A number whose logarithm is normal.
-    LogNormal {
-        /// Its median, above 0.
-        median: f64,
-        /// Standard deviation of its natural logarithm, above 0.
-        sigma: f64,
-    },
-    /// The absolute value of a normal number of mean 0.
-    HalfNormal {
-        /// Standard deviation of the normal number, above 0.
-        sd: f64,
-    },
-    /// The gamma law.
-    Gamma {
-        /// Its shape, above 0: the square of mean over standard deviation.
-        shape: f64,
-        /// Its scale, above 0: the mean is shape times scale.
-        scale: f64,
-    },
-    /// The Weibull law.
-    Weibull {
-        /// Its shape, above 0.
-        shape: f64,
-        /// Its scale, above 0: a share 1 - 1/e lies below it.
-        scale: f64,
-    },
+    /// Any number from the first to the second, all equally probable.
+    Uniform([f64; 2]),
+    /// A number from the first, above 0, to the second whose logarithm is uniform.
+    LogUniform([f64; 2]),
+    /// The normal law of this mean and standard deviation, above 0.
+    Normal([f64; 2]),
+    /// A number whose logarithm is normal: its median, above 0, and the standard deviation of its natural logarithm,
+    /// above 0.
+    LogNormal([f64; 2]),
+    /// The absolute value of a normal number of mean 0 and this standard deviation, above 0.
+    HalfNormal(f64),
+    /// The gamma law of this shape, above 0, the square of mean over standard deviation; and scale, above 0: the mean
+    /// is shape times scale.
+    Gamma([f64; 2]),
+    /// The Weibull law of this shape, above 0, and scale, above 0: a share 1 - 1/e lies below it.
+    Weibull([f64; 2]),
     /// One of these values, all equally probable.
     Choice(Vec<f64>),
     /// These values, one for each member in their order.
@@ -134,44 +89,41 @@ impl Distribution {
         let range = |usage: &str| {
             let ends = arguments.split_once("..").and_then(|(low, high)| Some((finite(low)?, finite(high)?)));
             let (low, high) = ends.ok_or_else(|| wrong("not a range of finite numbers", usage))?;
-            if low < high { Ok((low, high)) } else { Err(wrong("the range is empty", usage)) }
+            if low < high { Ok([low, high]) } else { Err(wrong("the range is empty", usage)) }
         };
         let pair = |what: &str, usage: &str| {
             let pair = arguments.split_once(',').and_then(|(first, last)| Some((finite(first)?, finite(last)?)));
             let (centre, scale) = pair.ok_or_else(|| wrong("not two finite numbers", usage))?;
-            if scale > 0.0 { Ok((centre, scale)) } else { Err(wrong(&format!("the {what} must be above 0"), usage)) }
+            if scale > 0.0 { Ok([centre, scale]) } else { Err(wrong(&format!("the {what} must be above 0"), usage)) }
         };
         match name {
             _ if name != "table" && arguments.contains('(') => Err(wrong("a distribution inside another", USAGE)),
-            "uniform" => range("uniform(A..B) with A < B").map(|(low, high)| Distribution::Uniform { low, high }),
+            "uniform" => range("uniform(A..B) with A < B").map(Distribution::Uniform),
             "loguniform" => match range("loguniform(A..B) with 0 < A < B")? {
-                (low, high) if low > 0.0 => Ok(Distribution::LogUniform { low, high }),
+                ends if ends[0] > 0.0 => Ok(Distribution::LogUniform(ends)),
                 _ => Err(wrong("a logarithm needs numbers above 0", "loguniform(A..B) with 0 < A < B")),
             },
-            "normal" => {
-                let (mean, sd) = pair("standard deviation", "normal(MEAN,SD) with SD > 0")?;
-                Ok(Distribution::Normal { mean, sd })
-            }
+            "normal" => pair("standard deviation", "normal(MEAN,SD) with SD > 0").map(Distribution::Normal),
             "lognormal" => {
                 let usage =
                     "lognormal(MEDIAN,SIGMA) with MEDIAN > 0 and SIGMA > 0, the standard deviation of the logarithm";
                 match pair("standard deviation of the logarithm", usage)? {
-                    (median, sigma) if median > 0.0 => Ok(Distribution::LogNormal { median, sigma }),
+                    law if law[0] > 0.0 => Ok(Distribution::LogNormal(law)),
                     _ => Err(wrong("the median must be above 0", usage)),
                 }
             }
             "halfnormal" => match finite(arguments).filter(|sd| *sd > 0.0) {
-                Some(sd) => Ok(Distribution::HalfNormal { sd }),
+                Some(sd) => Ok(Distribution::HalfNormal(sd)),
                 None => Err(wrong("not a number above 0", "halfnormal(SD) with SD > 0")),
             },
             "gamma" | "weibull" => {
                 let usage = format!("{name}(SHAPE,SCALE) with SHAPE > 0 and SCALE > 0");
                 match pair("scale", &usage)? {
-                    (shape, _) if !(MIN_SHAPE..=MAX_SHAPE).contains(&shape) => {
+                    [shape, _] if !(MIN_SHAPE..=MAX_SHAPE).contains(&shape) => {
                         Err(wrong(&format!("the shape must be {MIN_SHAPE} to {MAX_SHAPE}"), &usage))
                     }
-                    (shape, scale) if name == "gamma" => Ok(Distribution::Gamma { shape, scale }),
-                    (shape, scale) => Ok(Distribution::Weibull { shape, scale }),
+                    law if name == "gamma" => Ok(Distribution::Gamma(law)),
+                    law => Ok(Distribution::Weibull(law)),
                 }
             }
             "choice" | "each" | "empirical" => {
@@ -199,7 +151,10 @@ impl Distribution {
                 let (file, column) = arguments.rsplit_once(',').ok_or_else(|| wrong("not two names", usage))?;
                 column_of(Path::new(file.trim()), column.trim()).map(Distribution::Each)
             }
-            _ => Err(format!("unknown distribution `{}`{}; one of {USAGE}", echo(name), did_you_mean(name, NAMES))),
+            _ => {
+                let names = USAGE.split(", ").filter_map(|form| Some(form.split_once('(')?.0));
+                Err(format!("unknown distribution `{}`{}; one of {USAGE}", echo(name), did_you_mean(name, names)))
+            }
         }
     }
 
@@ -244,14 +199,14 @@ impl Distribution {
             | Distribution::Each(_)
             | Distribution::Empirical(_)
             | Distribution::Within { .. } => return None,
-            Distribution::Uniform { low, high } => ((x - low) / (high - low)).clamp(0.0, 1.0),
-            Distribution::LogUniform { low, high } => ((x / low).ln() / (high / low).ln()).clamp(0.0, 1.0),
-            Distribution::Normal { mean, sd } => normal((x - mean) / sd),
+            Distribution::Uniform([low, high]) => ((x - low) / (high - low)).clamp(0.0, 1.0),
+            Distribution::LogUniform([low, high]) => ((x / low).ln() / (high / low).ln()).clamp(0.0, 1.0),
+            Distribution::Normal([mean, sd]) => normal((x - mean) / sd),
             _ if x <= 0.0 => 0.0,
-            Distribution::LogNormal { median, sigma } => normal((x / median).ln() / sigma),
-            Distribution::HalfNormal { sd } => libm::erf(x / sd / SQRT_2),
-            Distribution::Gamma { shape, scale } => gamma::lower(*shape, x / scale),
-            Distribution::Weibull { shape, scale } => -(-(x / scale).powf(*shape)).exp_m1(),
+            Distribution::LogNormal([median, sigma]) => normal((x / median).ln() / sigma),
+            Distribution::HalfNormal(sd) => libm::erf(x / sd / SQRT_2),
+            Distribution::Gamma([shape, scale]) => gamma::lower(*shape, x / scale),
+            Distribution::Weibull([shape, scale]) => -(-(x / scale).powf(*shape)).exp_m1(),
         };
         Some(share)
     }
@@ -259,14 +214,14 @@ impl Distribution {
     /// The number below which a share `u` in (0, 1) of all draws lies.
     pub fn quantile(&self, u: f64) -> f64 {
         match self {
-            Distribution::Uniform { low, high } => (low * (1.0 - u) + high * u).clamp(*low, *high),
-            Distribution::LogUniform { low, high } => (low.ln() * (1.0 - u) + high.ln() * u).exp().clamp(*low, *high),
-            Distribution::Normal { mean, sd } => mean + sd * normal_quantile(u),
-            Distribution::LogNormal { median, sigma } => median * (sigma * normal_quantile(u)).exp(),
+            Distribution::Uniform([low, high]) => (low * (1.0 - u) + high * u).clamp(*low, *high),
+            Distribution::LogUniform([low, high]) => (low.ln() * (1.0 - u) + high.ln() * u).exp().clamp(*low, *high),
+            Distribution::Normal([mean, sd]) => mean + sd * normal_quantile(u),
+            Distribution::LogNormal([median, sigma]) => median * (sigma * normal_quantile(u)).exp(),
             // From the nearer end, where a tail may be thin.
-            Distribution::HalfNormal { sd } => -sd * normal_quantile(0.5 * (1.0 - u)),
-            Distribution::Gamma { shape, scale } => scale * gamma::quantile(*shape, u),
-            Distribution::Weibull { shape, scale } => scale * (-(-u).ln_1p()).powf(1.0 / shape),
+            Distribution::HalfNormal(sd) => -sd * normal_quantile(0.5 * (1.0 - u)),
+            Distribution::Gamma([shape, scale]) => scale * gamma::quantile(*shape, u),
+            Distribution::Weibull([shape, scale]) => scale * (-(-u).ln_1p()).powf(1.0 / shape),
             Distribution::Choice(values) | Distribution::Each(values) => {
                 values[((u * values.len() as f64) as usize).min(values.len() - 1)]
             }
@@ -299,13 +254,13 @@ pub const SMALLEST: f64 = 1.0 / (1_u64 << 30) as f64;
 impl fmt::Display for Distribution {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Distribution::Uniform { low, high } => write!(f, "uniform({}..{})", number(*low), number(*high)),
-            Distribution::LogUniform { low, high } => write!(f, "loguniform({}..{})", number(*low), number(*high)),
-            Distribution::Normal { mean, sd } => write!(f, "normal({},{})", number(*mean), number(*sd)),
-            Distribution::LogNormal { median, sigma } => write!(f, "lognormal({},{})", number(*median), number(*sigma)),
-            Distribution::HalfNormal { sd } => write!(f, "halfnormal({})", number(*sd)),
-            Distribution::Gamma { shape, scale } => write!(f, "gamma({},{})", number(*shape), number(*scale)),
-            Distribution::Weibull { shape, scale } => write!(f, "weibull({},{})", number(*shape), number(*scale)),
+            Distribution::Uniform([low, high]) => write!(f, "uniform({}..{})", number(*low), number(*high)),
+            Distribution::LogUniform([low, high]) => write!(f, "loguniform({}..{})", number(*low), number(*high)),
+            Distribution::Normal([mean, sd]) => write!(f, "normal({},{})", number(*mean), number(*sd)),
+            Distribution::LogNormal([median, sigma]) => write!(f, "lognormal({},{})", number(*median), number(*sigma)),
+            Distribution::HalfNormal(sd) => write!(f, "halfnormal({})", number(*sd)),
+            Distribution::Gamma([shape, scale]) => write!(f, "gamma({},{})", number(*shape), number(*scale)),
+            Distribution::Weibull([shape, scale]) => write!(f, "weibull({},{})", number(*shape), number(*scale)),
             Distribution::Choice(values) => write!(f, "choice({})", list(values)),
             Distribution::Each(values) => write!(f, "each({})", list(values)),
             Distribution::Empirical(values) => write!(f, "empirical({})", list(values)),
@@ -389,13 +344,13 @@ mod tests {
     /// The exact mean, where it has a formula.
     fn mean(law: &Distribution) -> Option<f64> {
         Some(match law {
-            Distribution::Uniform { low, high } => 0.5 * low + 0.5 * high,
-            Distribution::LogUniform { low, high } => (high - low) / (high / low).ln(),
-            Distribution::Normal { mean, .. } => *mean,
-            Distribution::LogNormal { median, sigma } => median * (0.5 * sigma * sigma).exp(),
-            Distribution::HalfNormal { sd } => sd * (2.0 / std::f64::consts::PI).sqrt(),
-            Distribution::Gamma { shape, scale } => shape * scale,
-            Distribution::Weibull { shape, scale } => scale * libm::tgamma(1.0 + 1.0 / shape),
+            Distribution::Uniform([low, high]) => 0.5 * low + 0.5 * high,
+            Distribution::LogUniform([low, high]) => (high - low) / (high / low).ln(),
+            Distribution::Normal([mean, _]) => *mean,
+            Distribution::LogNormal([median, sigma]) => median * (0.5 * sigma * sigma).exp(),
+            Distribution::HalfNormal(sd) => sd * (2.0 / std::f64::consts::PI).sqrt(),
+            Distribution::Gamma([shape, scale]) => shape * scale,
+            Distribution::Weibull([shape, scale]) => scale * libm::tgamma(1.0 + 1.0 / shape),
             // Half of the draws beyond the outer ranks are these values.
             Distribution::Choice(values) | Distribution::Each(values) | Distribution::Empirical(values) => {
                 values.iter().sum::<f64>() / values.len() as f64
@@ -451,7 +406,7 @@ mod tests {
             }
         }
         // A law that is five per cent wider fails.
-        let wide = Distribution::Normal { mean: 0.0, sd: 1.05 };
+        let wide = Distribution::Normal([0.0, 1.05]);
         let share =
             (0..count).filter(|j| wide.quantile(Stream::new(seed, *j, 0).uniforms(0)[0]) < normal_quantile(0.05));
         let off = (share.count() as f64 / count as f64 - 0.05) / (0.05 * 0.95 / count as f64).sqrt();

@@ -13,14 +13,14 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    envelope::{Fault, body, bytes, opened, sealed_body},
+    envelope::{Fault, bytes, opened, sealed_body},
     fingerprint::fingerprint,
 };
 use crate::{
     folder::OutputFolder,
     names::{self, STATE, STATE_OLD},
     part_file::Mark,
-    portraits::Film,
+    portraits::{self, Film},
     spill::SpilledRows,
     zarr,
 };
@@ -150,7 +150,7 @@ pub fn to_bytes(head: &CheckpointHead, progress: &RunProgress, resident: &BTreeM
 /// # Errors
 /// Those of [`opened`].
 pub fn from_bytes(bytes: &[u8]) -> Result<(CheckpointHead, RunProgress), Fault> {
-    let (head, next, early, resident): Body = body(opened(*LAYOUT, bytes)?)?;
+    let (head, next, early, resident): Body = opened(*LAYOUT, bytes)?;
     Ok((head, RunProgress { next, early, resident: Some(resident) }))
 }
 
@@ -190,9 +190,7 @@ pub fn find(folder: &OutputFolder) -> Result<Option<Saved>> {
         let found = read(folder.place(name).at()).and_then(|(head, progress)| {
             let tables = head.tables.iter().chain(&head.rows).try_for_each(|mark| folder.check(mark));
             let store = head.store.as_ref().map_or(Ok(()), |mark| folder.check_store(mark));
-            let film = head.films.iter().find_map(|film| Some((film.member, film.fault()?)));
-            let films =
-                film.map_or(Ok(()), |(member, fault)| Err(format!("the portrait of member {member} has not {fault}")));
+            let films = portraits::check(&head.films);
             tables.and(store).and(films).map_err(Fault::Damaged).map(|()| (head, progress))
         });
         match found {

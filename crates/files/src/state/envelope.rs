@@ -67,8 +67,9 @@ pub fn sealed<E>(layout: u32, write: impl FnOnce(Vec<u8>) -> Result<Vec<u8>, E>)
 ///
 /// # Errors
 /// A [`Fault`] unless the bytes are complete and written by this version of the program, with types of the same layout.
-pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
+pub fn opened<'a, T: Deserialize<'a>>(layout: u32, bytes: &'a [u8]) -> Result<T, Fault> {
     let damaged = |what: &str| Err(Fault::Damaged(what.into()));
+    let unreadable = |e: postcard::Error| Fault::Damaged(format!("it cannot be read ({e})"));
     let mut rest = bytes;
     let (Some(magic), Some(version), Some(length)) =
         (take::<16>(&mut rest), take::<4>(&mut rest), take::<8>(&mut rest))
@@ -104,19 +105,10 @@ pub fn opened(layout: u32, bytes: &[u8]) -> Result<&[u8], Fault> {
             "another build of curvelax {own} wrote it: its layout is {written:08x}, and that of this build is {layout:08x}"
         )));
     }
-    Ok(body)
-}
-
-/// Reads the result of [`opened`].
-pub fn body<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Result<T, Fault> {
-    match postcard::take_from_bytes(bytes).map_err(unreadable)? {
+    match postcard::take_from_bytes(body).map_err(unreadable)? {
         (body, []) => Ok(body),
-        _ => Err(Fault::Damaged("there is more in it than a checkpoint".into())),
+        _ => damaged("there is more in it than a checkpoint"),
     }
-}
-
-fn unreadable(e: postcard::Error) -> Fault {
-    Fault::Damaged(format!("it cannot be read ({e})"))
 }
 
 /// The length of the body, as given in the bytes before it.
@@ -174,7 +166,7 @@ mod tests {
     }
 
     fn read(bytes: &[u8]) -> Result<(u64, &str), Fault> {
-        body(opened(LAYOUT, bytes)?)
+        opened(LAYOUT, bytes)
     }
 
     /// Corrects the length and checksum in `bytes`.
@@ -210,7 +202,7 @@ mod tests {
 
     #[test]
     fn a_build_with_other_types_is_another_program() {
-        let error = opened(LAYOUT + 1, &sample()).unwrap_err();
+        let error = opened::<(u64, String)>(LAYOUT + 1, &sample()).unwrap_err();
         let own = curvelax_base::VERSION;
         let message = format!(
             "another build of curvelax {own} wrote it: its layout is 12345678, and that of this build is 12345679"

@@ -71,11 +71,6 @@ impl Tracer {
         self.enums.iter().find(|(_, (seen, all))| seen < all).map(|(name, _)| *name)
     }
 
-    /// The fields of a struct or of a variant, in order.
-    fn fields<'de, V: Visitor<'de>>(&mut self, fields: &'static [&'static str], visitor: V) -> Result<V::Value, Error> {
-        self.list("{", fields.len(), fields, visitor)
-    }
-
     /// A list of `left` values, with names if they have any.
     fn list<'de, V: Visitor<'de>>(
         &mut self,
@@ -157,7 +152,7 @@ impl<'de> VariantAccess<'de> for &mut Tracer {
     }
 
     fn struct_variant<V: Visitor<'de>>(self, fields: &'static [&'static str], visitor: V) -> Result<V::Value, Error> {
-        self.fields(fields, visitor)
+        self.list("{", fields.len(), fields, visitor)
     }
 }
 
@@ -245,7 +240,7 @@ impl<'de> Deserializer<'de> for &mut Tracer {
         visitor: V,
     ) -> Result<V::Value, Error> {
         self.note(name);
-        self.fields(fields, visitor)
+        self.list("{", fields.len(), fields, visitor)
     }
 
     fn deserialize_enum<V: Visitor<'de>>(

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use super::{
     checkpoint::Origin,
-    envelope::{Fault, body, bytes, opened, sealed_body},
+    envelope::{Fault, bytes, opened, sealed_body},
     fingerprint::fingerprint,
 };
 use crate::{folder::OutputFolder, names::OUTLINES};
@@ -43,7 +43,7 @@ pub fn find(folder: &OutputFolder, origin: &Origin) -> Result<Outlines, String> 
 
 fn read(folder: &OutputFolder, origin: &Origin) -> Result<Outlines, Fault> {
     let bytes = bytes(folder.place(OUTLINES).at())?;
-    let saved: Content = body(opened(*LAYOUT, &bytes)?)?;
+    let saved: Content = opened(*LAYOUT, &bytes)?;
     let outlines =
         Outlines::restored(saved).ok_or_else(|| Fault::Damaged("it holds points without an outline".into()))?;
     match origin.differs(&outlines) {

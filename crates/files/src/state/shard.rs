@@ -19,7 +19,7 @@ use super::{
 use crate::{
     claim,
     growing::Growing,
-    names::{PORTRAITS, RUN, SHARD, STATE, STATE_OLD},
+    names::{PORTRAITS, RUN, SHARD, SHOWN, STATE, STATE_OLD},
     part_file::Mark,
     portraits, reader,
 };
@@ -32,8 +32,6 @@ use curvelax_study::results::provenance::rfc3339;
 
 /// Keys that a resumed run may change.
 const MOVED_KEYS: [&str; 3] = ["threads", "backend", "adapter"];
-/// Characters of a fault in a message.
-const SHOWN: usize = 200;
 
 /// The fingerprint of the layout of the file's content.
 pub static LAYOUT: LazyLock<u32> = LazyLock::new(fingerprint::<Record>);
@@ -86,11 +84,9 @@ pub fn to_bytes(head: &CheckpointHead, points: usize, warnings: &[String]) -> Re
 /// # Errors
 /// A [`Fault`] unless the bytes are complete and written by this version of the program.
 pub fn from_bytes(bytes: &[u8]) -> Result<Record, Fault> {
-    let record: Record = envelope::body(opened(*LAYOUT, bytes)?)?;
-    match record.head.films.iter().find_map(|film| Some((film.member, film.fault()?))) {
-        Some((member, fault)) => Err(Fault::Damaged(format!("the portrait of member {member} has not {fault}"))),
-        None => Ok(record),
-    }
+    let record: Record = opened(*LAYOUT, bytes)?;
+    portraits::check(&record.head.films).map_err(Fault::Damaged)?;
+    Ok(record)
 }
 
 /// Examines the folder of a shard without changing it.
@@ -136,8 +132,7 @@ fn part(path: &Path) -> Result<FinishedShard> {
     let faulty = |fault: &str| faulty(path, SHARD, fault);
     let read = envelope::bytes(&path.join(SHARD)).and_then(|bytes| from_bytes(&bytes));
     let record = read.map_err(|(Fault::Foreign(what) | Fault::Damaged(what))| faulty(&what))?;
-    let spec = Spec::from_toml(&record.head.origin.spec).map_err(|e| e.to_string());
-    let spec = spec.and_then(|spec| spec.validate().map_err(|e| e.to_string()));
+    let spec = Spec::from_toml(&record.head.origin.spec).and_then(|spec| spec.validate().map_err(|e| e.to_string()));
     let spec = spec.map_err(|e| faulty(&format!("its spec: {}", shortened(&one_line(&e), SHOWN))))?;
     let Some(shard) = spec.shard else {
         return Err(faulty("its spec is not of a shard"));

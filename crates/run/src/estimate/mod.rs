@@ -17,7 +17,7 @@ use curvelax_backend::DeviceKind;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{LevelTimes, Spec, Study, study::Stage};
 use curvelax_files::zarr;
-use curvelax_study::placement::{ChosenBackend, Platform};
+use curvelax_study::placement::{ChosenBackend, OpeningWatch, Platform};
 use finer::{FinerPilot, LevelGrowth};
 pub use pilot::Pilot;
 use pilot::{CohortSample, CohortWork, Limits, points, sample};
@@ -101,9 +101,9 @@ impl Estimate {
                 continue;
             }
             let mut cells = study.cells_of(stage, &LevelTimes::default())?.into_owned();
-            let (precision, in_software) = (choice.precision(), choice.is_software_gpu());
+            let (precision, in_software) = (choice.precision, choice.is_software_gpu());
             let started = Instant::now();
-            let (mut backend, platform) = choice.open_for(&cells)?;
+            let (mut backend, platform) = choice.open_for(&cells, &OpeningWatch::default())?;
             start_up += started.elapsed().as_secs_f64();
             let work = match (platform.threads, in_software) {
                 (Some(threads), _) => WORK_PER_THREAD * threads as f64,
@@ -232,7 +232,7 @@ fn finest(study: &Study) -> Option<usize> {
 
 /// Nodes of the members of `spec`, and how many of them are resident at once; a GPU is not opened for that.
 fn slots_at(spec: &Spec, choice: &ChosenBackend) -> Result<(usize, Option<usize>)> {
-    let slots = match choice.device().kind() {
+    let slots = match choice.device.kind() {
         DeviceKind::Cpu => Some(choice.open(spec)?.0.slots()),
         DeviceKind::Gpu => None,
     };

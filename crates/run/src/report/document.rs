@@ -7,7 +7,7 @@ use serde::Serialize;
 use toml::Value;
 
 use curvelax_ensemble::{Spec, Status};
-use curvelax_statistics::LogRank;
+use curvelax_statistics::{LogRank, PairedDifferences};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     comparison::{CellComparison, CellDifference, LeftOut},
@@ -89,7 +89,8 @@ struct PairedDocument {
 
 impl PairedDocument {
     fn new(of: &CellDifference) -> PairedDocument {
-        let CellDifference { cell, pairs, equal, median, interval, test, left_out } = *of;
+        let CellDifference { cell, found, left_out } = *of;
+        let PairedDifferences { pairs, equal, median, interval, test } = found;
         PairedDocument {
             cell,
             against: 0,

@@ -123,7 +123,7 @@ impl Overview<'_> {
     /// Each member with its time, where they are few and known by name.
     fn members(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let names: Vec<String> = self.tally.named.iter().map(|member| member_name(self.spec, member)).collect();
-        let times: Vec<String> = self.tally.named.iter().map(member_time).collect();
+        let times: Vec<String> = self.tally.named.iter().map(|member| member_time(self.tally, member)).collect();
         let unit = unit_in_title(self.spec);
         let (time, error) = (self.statistics.time(), if self.statistics.of_limits { " ± t_error" } else { "" });
         let title = format!("{time}{error}{unit}");
@@ -137,7 +137,7 @@ impl Overview<'_> {
         for ((member, name), time) in self.tally.named.iter().zip(&names).zip(&times) {
             let data = of_points(&member.t_data_error.map_or(String::new(), |error| rounded(error, 2)));
             write!(f, "{:<11}{name:<label$}  {time:<columns$}  {data}{}", member.member, member.status.name())?;
-            match (member.vanishing, member.t_vanish) {
+            match (member.t_vanish_limit.zip(member.t_vanish_error), member.t_vanish) {
                 (Some((limit, error)), _) => write!(f, " at the limit {}", with_error(limit, error))?,
                 (None, Some(t)) => write!(f, " at {}", significant(t))?,
                 (None, None) => {}

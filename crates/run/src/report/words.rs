@@ -6,10 +6,10 @@ use curvelax_base::{
 };
 use curvelax_curve::Perturbation;
 use curvelax_ensemble::{
-    Drawn, Event, Spec,
+    Drawn, Event, Outcome, Spec,
     request::spec::{FinalTime, OrAuto, Pace, Units},
 };
-use curvelax_statistics::{GoodnessOfFit, LogRank, PowerLaw};
+use curvelax_statistics::{GoodnessOfFit, LogRank, PairedDifferences, PowerLaw};
 use curvelax_study::{
     placement::Platform,
     results::{
@@ -17,7 +17,7 @@ use curvelax_study::{
         comparison::{CellDifference, LeftOut},
         discretisation::DiscretisationError,
         scaling::Scaling,
-        tally::MemberTime,
+        tally::{Tally, shown_time},
         times::TimeStatistics,
     },
 };
@@ -178,7 +178,7 @@ pub(super) fn raw(of: &TimeStatistics, spec: &Spec) -> String {
 }
 
 /// The name of a member: that of its outline, and what distinguishes its cell.
-pub fn member_name(spec: &Spec, member: &MemberTime) -> String {
+pub fn member_name(spec: &Spec, member: &Outcome) -> String {
     let label = (!member.label.is_empty()).then(|| shortened(&member.label, MAX_GROUP));
     let cell = (!spec.sweep.is_empty()).then(|| spec.sweep.name(member.cell));
     let name = label.into_iter().chain(cell).collect::<Vec<_>>().join(", ");
@@ -194,11 +194,11 @@ pub fn in_the_limit(t_limit: f64, unit: &str) -> String {
 }
 
 /// The time of a member with its error, or until when it had not relaxed, if that is known.
-pub fn member_time(member: &MemberTime) -> String {
-    match member.shown() {
+pub fn member_time(tally: &Tally, member: &Outcome) -> String {
+    match shown_time(member) {
         Some((t, Some(error))) => with_error(t, error),
         Some((t, None)) => significant(t),
-        None => member.later_than.map_or("not known".into(), |t| format!("> {}", significant(t))),
+        None => tally.later_than(member).map_or("not known".into(), |t| format!("> {}", significant(t))),
     }
 }
 
@@ -331,18 +331,19 @@ pub(super) fn law(of: &Scaling, time: &str) -> Vec<String> {
 
 /// The differences of a cell from the first.
 pub(super) fn paired(of: &CellDifference) -> String {
-    let CellDifference { pairs, equal, median, interval, test, left_out, .. } = of;
-    let which = plural(*pairs as u64, "pair");
+    let CellDifference { found, left_out, .. } = of;
+    let PairedDifferences { pairs, equal, median, interval, test } = *found;
+    let which = plural(pairs as u64, "pair");
     let difference = match (median, interval, test) {
         (None, ..) => "has no pair in which both relaxed".into(),
         (Some(0.0), _, None) => format!("is equal in {pairs} {which}"),
-        (Some(median), _, None) => format!("differs by {} in {pairs} {which}, not tested", significant(*median)),
+        (Some(median), _, None) => format!("differs by {} in {pairs} {which}, not tested", significant(median)),
         (Some(median), interval, Some(test)) => {
             let bounds = interval.map_or(String::new(), |(low, high)| {
                 format!(" (95 % interval {} to {})", significant(low), significant(high))
             });
-            let equal = if *equal > 0 { format!(", {equal} of them equal") } else { String::new() };
-            let (median, p) = (significant(*median), p_value(test.p_value));
+            let equal = if equal > 0 { format!(", {equal} of them equal") } else { String::new() };
+            let (median, p) = (significant(median), p_value(test.p_value));
             format!("differs by a median of {median}{bounds}, {p} over {pairs} {which}{equal}")
         }
     };
@@ -379,23 +380,25 @@ mod tests {
     #[test]
     fn differences_of_pairs_look_like_this() {
         let test = SignedRank { ranked: 510, statistic: 1e5, p_value: 1e-85, exact: false };
-        let some = CellDifference {
-            cell: 1,
+        let found = PairedDifferences {
             pairs: 512,
             equal: 2,
             median: Some(-1.25e-3),
             interval: Some((-1.5e-3, -1e-3)),
             test: Some(test),
-            left_out: LeftOut { later: 0, earlier: 2, unknown: 1 },
         };
+        let some = CellDifference { cell: 1, found, left_out: LeftOut { later: 0, earlier: 2, unknown: 1 } };
         let median = "differs by a median of -0.001250 (95 % interval -0.001500 to -0.001000), p = 1.0e-85 over 512 pairs, 2 of them equal";
         let left_out = "; 3 left out, since a member did not relax (2 earlier, 1 of unknown order)";
         assert_eq!(paired(&some), format!("{median}{left_out}"));
-        let equal = CellDifference { median: Some(0.0), test: None, left_out: LeftOut::default(), ..some.clone() };
+        let found = PairedDifferences { median: Some(0.0), test: None, ..found };
+        let equal = CellDifference { found, left_out: LeftOut::default(), ..some };
         assert_eq!(paired(&equal), "is equal in 512 pairs");
-        let copies = CellDifference { pairs: 1, median: Some(0.5), ..equal.clone() };
+        let found = PairedDifferences { pairs: 1, median: Some(0.5), ..found };
+        let copies = CellDifference { found, ..equal };
         assert_eq!(paired(&copies), "differs by 0.5000 in 1 pair, not tested");
-        assert_eq!(paired(&CellDifference { median: None, ..equal }), "has no pair in which both relaxed");
+        let found = PairedDifferences { median: None, ..found };
+        assert_eq!(paired(&CellDifference { found, ..equal }), "has no pair in which both relaxed");
     }
 
     #[test]

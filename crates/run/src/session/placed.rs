@@ -65,7 +65,8 @@ impl PlacedStudy {
 
     /// Replaces the reason of the choices.
     pub(super) fn because(self, reason: &str) -> PlacedStudy {
-        let choices = self.choices.into_iter().map(|choice| choice.because(reason.into())).collect();
+        let choices =
+            self.choices.into_iter().map(|choice| ChosenBackend { reason: reason.into(), ..choice }).collect();
         PlacedStudy { choices, ..self }
     }
 
@@ -74,7 +75,7 @@ impl PlacedStudy {
     pub(super) fn open(self, host: &dyn Host) -> Result<(PlacedStudy, FirstBackend)> {
         let (cells, choice) = self.first();
         let (backend, platform) = open(cells, choice, host)?;
-        if choice.device().kind() != platform.backend {
+        if choice.device.kind() != platform.backend {
             host.say(&format!("note: on the CPU instead: {}", platform.reason));
             // Its precision and tolerance may differ.
             let spec = Spec { backend: BackendChoice::Cpu, adapter: None, ..self.planned };
@@ -96,7 +97,7 @@ impl PlacedStudy {
 
     /// Returns whether the CPU may take over if the GPU fails.
     pub(super) fn may_fall_back(&self) -> bool {
-        self.first().1.may_fall_back()
+        self.first().1.or_cpu
     }
 
     /// What the user should know about the study and where it is computed.
@@ -113,5 +114,5 @@ impl PlacedStudy {
 
 /// Opens the back end chosen for a cohort, and tells the host.
 pub(super) fn open(cohort: &[Cell], choice: &ChosenBackend, host: &dyn Host) -> Result<(Box<dyn Backend>, Platform)> {
-    choice.open_watched(cohort, &OpeningWatch { tell: &|what| host.say(what), may_continue: &|| host.may_continue() })
+    choice.open_for(cohort, &OpeningWatch { tell: &|what| host.say(what), may_continue: &|| host.may_continue() })
 }

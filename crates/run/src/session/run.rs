@@ -16,7 +16,10 @@ use curvelax_files::{
     OutputFolder,
     state::checkpoint::{Origin, Saved},
 };
-use curvelax_study::{placement::ChosenBackend, results::RunVerdict};
+use curvelax_study::{
+    placement::{ChosenBackend, OpeningWatch},
+    results::RunVerdict,
+};
 
 /// A run that is complete.
 #[derive(Debug)]
@@ -134,12 +137,12 @@ fn advance(
         }
         // A run that has begun stays on its device.
         let choice = choice.after(&report.origin.platform);
-        let precision = choice.precision();
+        let precision = choice.precision;
         let mut backend = match first.take_if(|_| i == own) {
             Some(FirstBackend::Open(backend)) => backend,
-            Some(FirstBackend::Announced) => choice.open_for(&cells)?.0,
+            Some(FirstBackend::Announced) => choice.open_for(&cells, &OpeningWatch::default())?.0,
             // Of levels nothing is said: they are where the study is, or a pilot.
-            _ if stage.level.is_some() => choice.open_for(&cells)?.0,
+            _ if stage.level.is_some() => choice.open_for(&cells, &OpeningWatch::default())?.0,
             _ => open(&cells, &choice, host)?.0,
         };
         report.begin_stage(i, cells.iter().map(|cell| cell.spec.member_count()).sum());

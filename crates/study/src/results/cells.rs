@@ -10,12 +10,12 @@ use super::{
     discretisation::{CellLimits, DiscretisationError},
     scaling::{CellMedian, Scaling},
     tally::{CellTally, EventTally, Rate, Tally},
-    times::{Numbers, QUANTILES, Statistic, TimeStatistics, covered, intervals, places},
+    times::{Numbers, QUANTILES, Statistic, TimeStatistics, covered, ends, intervals, moments, of_mean, places},
 };
 use csv::WriterBuilder;
 use curvelax_base::error::{Error, Result};
 use curvelax_ensemble::{Spec, Status};
-use curvelax_statistics::{Description, Interval, Mean, Sample, interval};
+use curvelax_statistics::{Description, Interval, Sample, interval};
 use serde::Serialize;
 
 /// Relaxation times of one cell.
@@ -62,11 +62,7 @@ impl Rates {
     fn new(rates: &[Rate], relative: bool) -> Result<Rates> {
         let theory = Description::new(rates.iter().filter_map(Rate::theory))?.median();
         let fitted = Description::new(rates.iter().map(|rate| rate.fitted))?;
-        let moments = [
-            Statistic { name: "mean", value: fitted.mean(), meaning: "mean" },
-            Statistic { name: "sd", value: fitted.standard_deviation(), meaning: "standard deviation" },
-            Statistic { name: "se", value: fitted.standard_error(), meaning: "standard error of the mean" },
-        ];
+        let moments = moments("mean", [fitted.mean(), fitted.standard_deviation(), fitted.standard_error()]);
         let quantiles = QUANTILES.map(|(share, ..)| fitted.quantile(share));
         let of_quantiles = QUANTILES.map(|(share, ..)| interval::of_values(&fitted, share));
         let (intervals, [_, _, of_median, ..]) = (intervals(&of_quantiles), of_quantiles);
@@ -75,8 +71,8 @@ impl Rates {
         // Each is as large as all times of the cell: one at a time.
         let kept = (!relative).then_some(fitted);
         let ratio = Description::new(rates.iter().filter_map(Rate::ratio))?;
-        named.push(Statistic { name: "theory", value: theory, meaning: "median of the rates of linear theory" });
-        named.push(Statistic { name: "ratio", value: ratio.median(), meaning: "median of rate over linear theory" });
+        named.push(Statistic::new("theory", theory, "median of the rates of linear theory"));
+        named.push(Statistic::new("ratio", ratio.median(), "median of rate over linear theory"));
         Ok(Rates { numbers: Numbers { known, named, intervals }, drawn: kept.unwrap_or(ratio) })
     }
 }
@@ -164,20 +160,12 @@ impl CellStatistics {
 
     /// The numbers on the times at which members vanished, for the table.
     pub fn vanished(&self) -> Numbers {
-        let times = &self.vanishing.times;
-        let named = places(times.quantiles, times.interval()).filter(|of| of.name.starts_with("median"));
-        Numbers { known: times.sample.events(), named: named.collect(), intervals: Vec::new() }
+        of_median(self.vanishing.times.numbers())
     }
 
     /// The numbers on the limits of these times, for the table.
     pub fn vanished_limit(&self) -> Numbers {
-        let Numbers { known, named, .. } = self.vanishing.limit();
-        let of_error = |of: Statistic| match of.name {
-            "error" => Statistic { meaning: "median of t_vanish_error", ..of },
-            _ => of,
-        };
-        let named = named.into_iter().filter(|of| of.name.starts_with("median") || of.name == "error").map(of_error);
-        Numbers { known, named: named.collect(), intervals: Vec::new() }
+        of_median(self.vanishing.limit())
     }
 
     /// The row of a table, with `keys` after the index of the cell.
@@ -249,8 +237,8 @@ impl EventStatistics {
         let number = |number: fn(&DiscretisationError) -> f64| self.discretisation.as_ref().map(number);
         let mean = "mean relative error of the times by n and the steps, negative if they are too early";
         let named = vec![
-            Statistic { name: "mean", value: number(|of| of.mean), meaning: mean },
-            Statistic { name: "error", value: number(|of| of.error), meaning: "half-width of its 95 % interval" },
+            Statistic::new("mean", number(|of| of.mean), mean),
+            Statistic::new("error", number(|of| of.error), "half-width of its 95 % interval"),
         ];
         let known = self.discretisation.as_ref().map_or(0, |of| of.members);
         Numbers { known, named, intervals: Vec::new() }
@@ -260,21 +248,12 @@ impl EventStatistics {
     pub fn limit(&self) -> Numbers {
         let times = self.limits.as_ref().map(|limits| &limits.times);
         let error = self.limits.as_ref().and_then(|limits| limits.error);
-        let of = |number: fn(Mean) -> Option<f64>| times.and_then(|times| times.mean).and_then(number);
         let interval = times.and_then(TimeStatistics::interval);
-        let low = "lower end of the 95 % interval of the median, for sampling and discretisation together (with fewer than \
-                   6 members, of their range); empty if there is none";
-        let high = "upper end of the 95 % interval of the median, for sampling and discretisation together (with fewer \
-                    than 6 members, of their range); empty if there is none";
-        let named = vec![
-            Statistic { name: "mean", value: of(|mean| Some(mean.value)), meaning: "mean, by Kaplan–Meier" },
-            Statistic { name: "sd", value: of(|mean| mean.standard_deviation), meaning: "standard deviation" },
-            Statistic { name: "se", value: of(|mean| mean.standard_error), meaning: "standard error of the mean" },
-            Statistic { name: "median", value: times.and_then(TimeStatistics::median), meaning: "median" },
-            Statistic { name: "median_low", value: interval.and_then(|interval| interval.lower), meaning: low },
-            Statistic { name: "median_high", value: interval.and_then(|interval| interval.upper), meaning: high },
-            Statistic { name: "error", value: error, meaning: "median of t_error" },
-        ];
+        let of = "median, for sampling and discretisation together (with fewer than 6 members, of their range)";
+        let mut named: Vec<Statistic> = of_mean(times.and_then(|times| times.mean)).into();
+        named.push(Statistic::new("median", times.and_then(TimeStatistics::median), "median"));
+        named.extend(ends("median", [of; 2].map(String::from), interval));
+        named.push(Statistic::new("error", error, "median of t_error"));
         Numbers { known: times.map_or(0, |times| times.sample.events()), named, intervals: vec![covered(interval)] }
     }
 
@@ -384,6 +363,13 @@ impl EnsembleStatistics {
             row
         })
     }
+}
+
+/// The numbers of which the names say that they are on the median, and its error, of times at which members vanished.
+fn of_median(Numbers { known, mut named, .. }: Numbers) -> Numbers {
+    named.retain(|of| of.name.starts_with("median") || of.name == "error");
+    named.iter_mut().filter(|of| of.name == "error").for_each(|of| of.meaning = "median of t_vanish_error".into());
+    Numbers { known, named, intervals: Vec::new() }
 }
 
 fn word(name: impl Into<String>, holds: &'static str, value: &str, meaning: impl Into<String>) -> StatisticsField {

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::tally::{CellTally, EventTally, Tally};
 use curvelax_base::error::Result;
 use curvelax_ensemble::Spec;
-use curvelax_statistics::{LogRank, Observation, PairedDifferences, Sample, SignedRank, log_rank};
+use curvelax_statistics::{LogRank, Observation, PairedDifferences, Sample, log_rank};
 
 /// Expected events that each cell needs for the log-rank test.
 pub const MIN_EXPECTED: f64 = 5.0;
@@ -42,16 +42,8 @@ pub enum CellComparison {
 pub struct CellDifference {
     /// Index of the cell.
     pub cell: u64,
-    /// Pairs of members that both relaxed.
-    pub pairs: usize,
-    /// Of these, pairs with equal times.
-    pub equal: usize,
-    /// Median of the differences, this cell's time less that of the first.
-    pub median: Option<f64>,
-    /// Its 95 % interval, from 6 pairs on.
-    pub interval: Option<(f64, f64)>,
-    /// The test that they are centred on 0; `None` if all are equal, as those of copies are.
-    pub test: Option<SignedRank>,
+    /// Of the pairs of members that both relaxed: this cell's time less that of the first.
+    pub found: PairedDifferences,
     /// Pairs that are left out.
     pub left_out: LeftOut,
 }
@@ -101,16 +93,7 @@ impl CellDifference {
             first.next_if(|_| rank <= own);
             other.next_if(|_| own <= rank);
         }
-        let found = PairedDifferences::new(differences)?;
-        Ok(CellDifference {
-            cell,
-            pairs: found.count(),
-            equal: found.zeros(),
-            median: found.median(),
-            interval: found.interval(),
-            test: found.test(),
-            left_out,
-        })
+        Ok(CellDifference { cell, found: PairedDifferences::new(differences)?, left_out })
     }
 }
 
@@ -306,9 +289,13 @@ mod tests {
         assert!(log_rank(&[sample(&first), sample(&later)]).unwrap().p_value > 0.3);
         let compared = paired(&[&first, &later, &first], None);
         let [different, equal] = compared.paired_cells().unwrap() else { panic!("{compared:?}") };
-        let (low, high) = different.interval.unwrap();
-        assert!(low > 1.4e-6 && high < 1.6e-6 && different.test.unwrap().p_value < 1e-80, "seed 3: {different:?}");
-        assert_eq!((equal.cell, equal.pairs, equal.equal, equal.test, equal.median), (2, 512, 512, None, Some(0.0)));
+        let (low, high) = different.found.interval.unwrap();
+        assert!(
+            low > 1.4e-6 && high < 1.6e-6 && different.found.test.unwrap().p_value < 1e-80,
+            "seed 3: {different:?}"
+        );
+        let copies = PairedDifferences { pairs: 512, equal: 512, median: Some(0.0), interval: None, test: None };
+        assert_eq!((equal.cell, equal.found), (2, copies));
     }
 
     #[test]
@@ -317,13 +304,13 @@ mod tests {
         let of = |only: Option<Vec<u64>>| paired(&[first, other], only).paired_cells().unwrap()[0].clone();
         let all = of(None);
         // Differences ½ and 1; the second is later, the third earlier, and two are of unknown order.
-        assert_eq!((all.pairs, all.median), (2, Some(0.75)));
+        assert_eq!((all.found.pairs, all.found.median), (2, Some(0.75)));
         assert_eq!((all.left_out, all.left_out.count()), (LeftOut { later: 1, earlier: 1, unknown: 2 }, 4));
         // Members 0, 2, 5 of the first cell and 0, 1, 5 of the other: two pairs.
         let some = of(Some(vec![0, 2, 5, 6, 7, 11]));
-        assert_eq!((some.pairs, some.median, some.left_out.count()), (2, Some(0.75), 0));
+        assert_eq!((some.found.pairs, some.found.median, some.left_out.count()), (2, Some(0.75), 0));
         let none = of(Some(vec![0, 2, 7]));
-        assert_eq!((none.pairs, none.median, none.left_out.count()), (0, None, 0));
+        assert_eq!((none.found.pairs, none.found.median, none.left_out.count()), (0, None, 0));
     }
 
     #[test]

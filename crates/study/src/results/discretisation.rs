@@ -2,9 +2,7 @@
 
 use super::times::{QUANTILES, TimeStatistics};
 use curvelax_base::error::Result;
-use curvelax_statistics::{
-    Description, HALF_INTERVAL, Interval, KaplanMeier, Limit, Observation, Observations, Sample, interval,
-};
+use curvelax_statistics::{Description, HALF_INTERVAL, Interval, Limit, Observation, Observations, Sample, interval};
 
 /// What the levels tell of the relaxation times of a cell.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,8 +67,7 @@ impl CellLimits {
         if sample.events() == 0 {
             return Ok(None);
         }
-        let median = |sample: &Sample| KaplanMeier::new(sample).median();
-        let ends = median(&at_low_end).zip(median(&at_high_end)).filter(|_| !judged.is_empty());
+        let ends = at_low_end.median().zip(at_high_end.median()).filter(|_| !judged.is_empty());
         // Errors of discretisation have one sign for all members: they do not average out. So each end is that of
         // limits that are all as far on its side as they may be.
         let sampled = |share: f64| {

@@ -93,7 +93,7 @@ fn rounding(cell: &CellStatistics) -> f64 {
 /// Members for which the interval of the median time would be within `sampling` times the median: the share of the
 /// members per time near the median gives its width. None if it is not known.
 pub fn needed(cell: &CellStatistics, sampling: f64) -> Option<f64> {
-    let [low, median, high] = [0.5 - NEAR, 0.5, 0.5 + NEAR].map(|share| cell.relaxing.times.survival().quantile(share));
+    let [low, median, high] = [0.5 - NEAR, 0.5, 0.5 + NEAR].map(|share| cell.relaxing.times.sample.quantile(share));
     let spread = (high? - low?) / (2.0 * NEAR);
     Some((HALF_WIDTH * spread / (median? * sampling)).powi(2).ceil())
         .filter(|members| sampling > 0.0 && members.is_finite())

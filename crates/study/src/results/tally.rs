@@ -59,72 +59,16 @@ pub struct Tally {
     pub mesh_ratios: Vec<f32>,
     /// Metric drift of each member at its end, for a picture.
     pub metric_drifts: Vec<f32>,
-    /// The first members of each cell, ascending.
-    pub named: Vec<MemberTime>,
+    /// The first members of each cell, ascending; of their events those that have a limit are at it.
+    pub named: Vec<Outcome>,
 }
 
 /// Members that are known by name over all cells; of each cell they are as many as may be shown one by one.
 const MAX_KNOWN: usize = 2000;
 
-/// The time of a member that may be shown by itself.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct MemberTime {
-    /// Index of the member.
-    pub member: u64,
-    /// Index of its cell.
-    pub cell: u64,
-    /// Name of its outline; empty if it has none.
-    pub label: String,
-    /// How it ended.
-    pub status: Status,
-    /// When it ended, if it is known not to have relaxed by then.
-    pub later_than: Option<f64>,
-    /// Its relaxation time.
-    pub t_relax: Option<f64>,
-    /// When it vanished.
-    pub t_vanish: Option<f64>,
-    /// The limit of that, and the half-width of its 95 % interval.
-    pub vanishing: Option<(f64, f64)>,
-    /// Its limit.
-    pub t_limit: Option<f64>,
-    /// Half-width of the 95 % interval of that.
-    pub t_error: Option<f64>,
-    /// By how much the time changes with every second point of its outline.
-    pub t_data_error: Option<f64>,
-    /// The times of the events, or their limits, in the order of the spec.
-    pub events: Vec<Option<f64>>,
-}
-
-impl MemberTime {
-    fn new(outcome: &Outcome, counted: Counted) -> MemberTime {
-        let Counted { refined, vesicles, .. } = counted;
-        let Outcome { member, cell, status, t_end, t_relax, t_vanish, t_limit, t_error, t_data_error, .. } = *outcome;
-        let later_than = Some(t_end).filter(|_| !vesicles && t_relax.is_none());
-        let limit = |i: usize| outcome.limit_of_event(i).filter(|_| refined);
-        let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
-        let events = outcome.events.iter().enumerate().map(event).collect();
-        let label = outcome.label.clone();
-        let vanishing = outcome.t_vanish_limit.zip(outcome.t_vanish_error);
-        MemberTime {
-            member,
-            cell,
-            label,
-            status,
-            later_than,
-            t_relax,
-            t_vanish,
-            vanishing,
-            t_limit,
-            t_error,
-            t_data_error,
-            events,
-        }
-    }
-
-    /// The time that is shown: the limit, if there is one, with its error.
-    pub fn shown(&self) -> Option<(f64, Option<f64>)> {
-        self.t_limit.map(|t| (t, self.t_error)).or(self.t_relax.map(|t| (t, None)))
-    }
+/// The time of a member that is shown: the limit, if there is one, with its error.
+pub fn shown_time(of: &Outcome) -> Option<(f64, Option<f64>)> {
+    of.t_limit.map(|t| (t, of.t_error)).or(of.t_relax.map(|t| (t, None)))
 }
 
 /// Decay rate of a member.
@@ -355,7 +299,10 @@ impl Tally {
             self.cells.resize_with(cell + 1, CellTally::default);
         }
         if self.named.len() < MAX_KNOWN && self.cells[cell].counts.iter().sum::<u64>() < MAX_NAMED {
-            self.named.push(MemberTime::new(outcome, counted));
+            let limit = |i: usize| outcome.limit_of_event(i).filter(|_| counted.refined);
+            let event = |(i, t): (usize, &Option<f64>)| limit(i).map(|limit| limit.t).or(*t);
+            let events = outcome.events.iter().enumerate().map(event).collect();
+            self.named.push(Outcome { events, ..outcome.clone() });
         }
         self.cells[cell].add(outcome, counted)?;
         if !outcome.group.is_empty() {
@@ -390,8 +337,13 @@ impl Tally {
     }
 
     /// The time of `member`, if it is known by name.
-    pub fn named(&self, member: u64) -> Option<&MemberTime> {
+    pub fn named(&self, member: u64) -> Option<&Outcome> {
         self.named.binary_search_by_key(&member, |own| own.member).ok().map(|at| &self.named[at])
+    }
+
+    /// When a member ended, if it is known not to have relaxed by then.
+    pub fn later_than(&self, of: &Outcome) -> Option<f64> {
+        Some(of.t_end).filter(|_| !self.is_vesicle(of.cell) && of.t_relax.is_none())
     }
 
     /// Number of members that ended with a metric drift above [`DISTRUSTED_DRIFT`].

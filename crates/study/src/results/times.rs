@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
-use curvelax_statistics::{Interval, KaplanMeier, Mean, Observations, Sample, interval};
+use curvelax_statistics::{Interval, Mean, Observations, Sample, interval};
 
 /// Fractions of the members whose times are in the table, with the names and meanings of the columns.
 pub const QUANTILES: [(f64, &str, &str); 5] = [
@@ -40,11 +40,17 @@ pub struct Numbers {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistic {
     /// Its column, without the quantity.
-    pub name: &'static str,
+    pub name: String,
     /// The number, if known.
     pub value: Option<f64>,
     /// What it means.
-    pub meaning: &'static str,
+    pub meaning: String,
+}
+
+impl Statistic {
+    pub(super) fn new(name: impl Into<String>, value: Option<f64>, meaning: impl Into<String>) -> Statistic {
+        Statistic { name: name.into(), value, meaning: meaning.into() }
+    }
 }
 
 impl TimeStatistics {
@@ -55,10 +61,9 @@ impl TimeStatistics {
 
     /// Computes the statistics of sorted times.
     pub fn of(sample: Sample) -> TimeStatistics {
-        let survival = KaplanMeier::new(&sample);
         // The usual median, also of an even number.
-        let quantile = |share| if share == 0.5 { survival.median() } else { survival.quantile(share) };
-        let (mean, quantiles) = (survival.mean(), QUANTILES.map(|(share, ..)| quantile(share)));
+        let quantile = |share| if share == 0.5 { sample.median() } else { sample.quantile(share) };
+        let (mean, quantiles) = (sample.mean(), QUANTILES.map(|(share, ..)| quantile(share)));
         let intervals = QUANTILES.map(|(share, ..)| interval::of_sample(&sample, share));
         TimeStatistics { sample, mean, quantiles, intervals }
     }
@@ -71,23 +76,12 @@ impl TimeStatistics {
 
     /// The numbers for the table.
     pub fn numbers(&self) -> Numbers {
-        let of = |number: fn(Mean) -> Option<f64>| self.mean.and_then(number);
-        let (mean, sd) = (of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation));
-        let (se, restricted_to) = (of(|mean| mean.standard_error), of(|mean| mean.restricted_to));
+        let restricted_to = self.mean.and_then(|mean| mean.restricted_to);
         let restricted = "where the longest times are censored, the mean is restricted to times up to this one, and is a lower bound";
-        let moments = [
-            Statistic { name: "mean", value: mean, meaning: "mean, by Kaplan–Meier" },
-            Statistic { name: "sd", value: sd, meaning: "standard deviation" },
-            Statistic { name: "se", value: se, meaning: "standard error of the mean" },
-            Statistic { name: "restricted_to", value: restricted_to, meaning: restricted },
-        ];
-        let named = moments.into_iter().chain(places(self.quantiles, self.interval())).collect();
+        let moments =
+            of_mean(self.mean).into_iter().chain([Statistic::new("restricted_to", restricted_to, restricted)]);
+        let named = moments.chain(places(self.quantiles, self.interval())).collect();
         Numbers { known: self.sample.events(), named, intervals: intervals(&self.intervals) }
-    }
-
-    /// The share of the members that have not had the event.
-    pub fn survival(&self) -> KaplanMeier<'_> {
-        KaplanMeier::new(&self.sample)
     }
 
     /// Time by which half of the members have had the event.
@@ -126,61 +120,55 @@ impl Serialize for Numbers {
     }
 }
 
+/// A mean time, if it is known, the standard deviation and the standard error.
+pub(super) fn of_mean(mean: Option<Mean>) -> [Statistic; 3] {
+    let of = |number: fn(Mean) -> Option<f64>| mean.and_then(number);
+    let all = [of(|mean| Some(mean.value)), of(|mean| mean.standard_deviation), of(|mean| mean.standard_error)];
+    moments("mean, by Kaplan–Meier", all)
+}
+
+/// A mean, its meaning, the standard deviation and the standard error.
+pub(super) fn moments(of_mean: &str, [mean, sd, se]: [Option<f64>; 3]) -> [Statistic; 3] {
+    [
+        Statistic::new("mean", mean, of_mean),
+        Statistic::new("sd", sd, "standard deviation"),
+        Statistic::new("se", se, "standard error of the mean"),
+    ]
+}
+
 /// Quantiles, and the interval of the median.
 pub(super) fn places(
     quantiles: [Option<f64>; QUANTILES.len()],
     interval: Option<Interval>,
 ) -> impl Iterator<Item = Statistic> {
-    let [value, upper] = ends(interval);
-    let low =
-        "lower end of the 95 % interval of the median (with fewer than 6 members, the minimum); empty if there is none";
-    let high =
-        "upper end of the 95 % interval of the median (with fewer than 6 members, the maximum); empty if there is none";
-    let ends = [
-        Statistic { name: "median_low", value, meaning: low },
-        Statistic { name: "median_high", value: upper, meaning: high },
-    ];
+    let of_median = |end| format!("median (with fewer than 6 members, the {end})");
+    let ends = ends("median", ["minimum", "maximum"].map(of_median), interval);
     let quantiles = QUANTILES.into_iter().zip(quantiles);
-    quantiles.map(|((_, name, meaning), value)| Statistic { name, value, meaning }).chain(ends)
+    quantiles.map(|((_, name, meaning), value)| Statistic::new(name, value, meaning)).chain(ends)
 }
-
-/// Names and meanings of the ends of the intervals of the [quantiles](QUANTILES) but the median.
-const ENDS: [[(&str, &str); 2]; QUANTILES.len()] = [
-    [
-        ("q05_low", "lower end of the 95 % interval of the 5 % quantile; empty if there is none"),
-        ("q05_high", "upper end of the 95 % interval of the 5 % quantile; empty if there is none"),
-    ],
-    [
-        ("q25_low", "lower end of the 95 % interval of the 25 % quantile; empty if there is none"),
-        ("q25_high", "upper end of the 95 % interval of the 25 % quantile; empty if there is none"),
-    ],
-    [("", ""); 2],
-    [
-        ("q75_low", "lower end of the 95 % interval of the 75 % quantile; empty if there is none"),
-        ("q75_high", "upper end of the 95 % interval of the 75 % quantile; empty if there is none"),
-    ],
-    [
-        ("q95_low", "lower end of the 95 % interval of the 95 % quantile; empty if there is none"),
-        ("q95_high", "upper end of the 95 % interval of the 95 % quantile; empty if there is none"),
-    ],
-];
 
 /// What the interval of the median covers, and the intervals of the other quantiles, as far as they cover 95 %.
 pub(super) fn intervals(of: &[Option<Interval>; QUANTILES.len()]) -> Vec<Statistic> {
     let [_, _, median, ..] = of;
-    let named = ENDS.iter().zip(of).filter(|(names, _)| !names[0].0.is_empty()).flat_map(|(names, interval)| {
-        let values = ends(interval.filter(|interval| interval.range_of.is_none()));
-        names.iter().zip(values).map(|((name, meaning), value)| Statistic { name, value, meaning })
+    let others = QUANTILES.into_iter().zip(of).filter(|((share, ..), _)| *share != 0.5);
+    let of_ends = others.flat_map(|((_, name, meaning), interval)| {
+        ends(name, [meaning; 2].map(String::from), interval.filter(|interval| interval.range_of.is_none()))
     });
-    [covered(*median)].into_iter().chain(named).collect()
+    [covered(*median)].into_iter().chain(of_ends).collect()
+}
+
+/// The ends of the interval of the quantile called `name`, with what the lower and the upper one is that of.
+pub(super) fn ends(name: &str, of: [String; 2], interval: Option<Interval>) -> impl Iterator<Item = Statistic> {
+    let values = interval.map_or([None; 2], |interval| [interval.lower, interval.upper]);
+    let ends = [("low", "lower"), ("high", "upper")].into_iter().zip(of).zip(values);
+    ends.map(move |(((end, side), of), value)| {
+        let meaning = format!("{side} end of the 95 % interval of the {of}; empty if there is none");
+        Statistic::new(format!("{name}_{end}"), value, meaning)
+    })
 }
 
 /// What the interval of the median covers.
 pub(super) fn covered(median: Option<Interval>) -> Statistic {
     let meaning = "probability that the median is between median_low and median_high, a lower bound";
-    Statistic { name: "median_coverage", value: median.map(|interval| interval.coverage), meaning }
-}
-
-fn ends(of: Option<Interval>) -> [Option<f64>; 2] {
-    of.map_or([None, None], |interval| [interval.lower, interval.upper])
+    Statistic::new("median_coverage", median.map(|interval| interval.coverage), meaning)
 }

@@ -42,7 +42,7 @@ impl Problem {
             sampling: self.curve.sampling(),
             amplitude: 0.0.into(),
             flow: self.flow.clone().into(),
-            tau: at.tolerance.is_none().then_some(at.tau.into()),
+            tau: at.tau.map(Into::into),
             adaptive: at.tolerance,
             t_end: Some(self.t_end.into()),
             energy,
@@ -60,7 +60,7 @@ impl Problem {
     pub fn solve(&self, method: &Spec, at: Resolution) -> Result<Solved> {
         let spec = self.spec(method, at).validate()?;
         let choice = placement::choose(&spec)?;
-        let precision = choice.precision();
+        let precision = choice.precision;
         let family = Family::of(&spec, self.curve.resolve(precision))?;
         let (mut backend, _) = choice.open(&spec)?;
         let mut ended: Vec<Ended> = Vec::new();
@@ -86,6 +86,9 @@ pub enum Varied {
 }
 
 impl Varied {
+    /// All of them.
+    pub const ALL: [Varied; 3] = [Varied::Nodes, Varied::Step, Varied::Tolerance];
+
     /// Returns the name used in the table.
     pub fn name(self) -> &'static str {
         match self {
@@ -99,7 +102,7 @@ impl Varied {
     fn fineness(self, at: Resolution) -> f64 {
         match self {
             Varied::Nodes => 1.0 / at.n as f64,
-            Varied::Step => at.tau,
+            Varied::Step => at.tau.unwrap_or(f64::NAN),
             Varied::Tolerance => at.tolerance.unwrap_or(f64::NAN),
         }
     }
@@ -139,7 +142,7 @@ pub fn studies(problem: &Problem, solver: Solver) -> Vec<ConvergenceStudy> {
         ConvergenceStudy { varied: Varied::Nodes, at: nodes.iter().map(by_nodes).collect() },
         ConvergenceStudy {
             varied: Varied::Tolerance,
-            at: TOLERANCES.map(|tolerance| problem.to_tolerance(FIXED_NODES, tolerance)).into(),
+            at: TOLERANCES.map(|own| Resolution { n: FIXED_NODES, tau: None, tolerance: Some(own) }).into(),
         },
         ConvergenceStudy { varied: Varied::Step, at: STEPS.map(|steps| problem.in_steps(FIXED_NODES, steps)).into() },
     ]
@@ -204,7 +207,7 @@ mod tests {
     use super::*;
 
     fn study(varied: Varied) -> ConvergenceStudy {
-        let at = [10, 20, 40].map(|n| Resolution { n, tau: 1.0 / n as f64, tolerance: None });
+        let at = [10, 20, 40].map(|n| Resolution { n, tau: Some(1.0 / n as f64), tolerance: None });
         ConvergenceStudy { varied, at: at.into() }
     }
 

@@ -15,11 +15,11 @@
 //!
 //! # Practice
 //!
-//! A [`Problem`] is a value: flow, curve, final time, the measured quantity, its exact value, and the error bound.
-//! [`problems`] is the single table of them, for the tests on every back end and for `curvelax convergence`.
-//! [`Problem::solve`] runs it at a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number.
-//! [`WorkPrecision`] measures what an error of the relaxation time costs. A [`Referee`] solves the flow of any smooth
-//! curve by another method; a [`RefereeRow`] compares a relaxation time with it.
+//! A [`Problem`] is a value: flow, curve, final time, the measured quantity, and its exact value. [`problems`] is the
+//! single table of them, for the tests on every back end and for `curvelax convergence`. [`Problem::solve`] runs it at
+//! a [`Resolution`] like any other run; a [`ConvergenceStudy`] refines one number. [`WorkPrecision`] measures what an
+//! error of the relaxation time costs. A [`Referee`] solves the flow of any smooth curve by another method; a
+//! [`RefereeRow`] compares a relaxation time with it.
 
 mod convergence;
 mod fourier;
@@ -32,7 +32,7 @@ mod work_precision;
 
 pub use convergence::{ConvergenceRow, ConvergenceStudy, Solved, Varied, studies};
 pub use measure::{Measure, mode_amplitude};
-pub use problems::{Beside, ErrorBound, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
+pub use problems::{Beside, LEMNISCATE_LIFE, Problem, Resolution, StartCurve, problems};
 pub use referee::{Referee, Truth};
 pub use refereed::{RefereeRow, limits, one_curve, relaxation_truth};
 pub use theory::{CircleMode, circle_mode};

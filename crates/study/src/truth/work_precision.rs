@@ -38,36 +38,15 @@ impl Effort {
 const STEPS: [f64; 4] = [1e-2, 2.5e-3, 6.25e-4, 1.5625e-4];
 /// Tolerance of the reference.
 const FINEST: f64 = 1e-8;
-/// How the time of a row is cut into steps.
+/// How the time of a row is cut into steps: of one length, or adaptive ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stepping {
-    /// Steps of this length, in length⁴.
-    Fixed(f64),
-    /// Adaptive steps.
-    Adaptive {
-        /// Their tolerance.
-        tolerance: f64,
-        /// Their highest order.
-        most_order: u32,
-    },
-}
-
-impl Stepping {
-    /// τ or the tolerance.
-    pub fn settings(self) -> (Option<f64>, Option<f64>) {
-        match self {
-            Stepping::Fixed(tau) => (Some(tau), None),
-            Stepping::Adaptive { tolerance, .. } => (None, Some(tolerance)),
-        }
-    }
-
-    /// The highest order.
-    pub fn order(self) -> u32 {
-        match self {
-            Stepping::Fixed(_) => 1,
-            Stepping::Adaptive { most_order, .. } => most_order,
-        }
-    }
+pub struct Stepping {
+    /// The length, in length⁴.
+    pub tau: Option<f64>,
+    /// The tolerance of adaptive steps.
+    pub tolerance: Option<f64>,
+    /// Their highest order, 1 for fixed ones.
+    pub most_order: u32,
 }
 
 /// A row of the table: one method.
@@ -105,7 +84,7 @@ impl WorkPrecision {
     /// # Errors
     /// [`Error::Request`] if `method` is not available, [`Error::Failed`] if a member of the reference does not relax.
     pub fn new(method: &Spec) -> Result<WorkPrecision> {
-        let precision = placement::choose(&method.clone().validate()?)?.precision();
+        let precision = placement::choose(&method.clone().validate()?)?.precision;
         let exactly = Spec {
             backend: BackendChoice::Cpu,
             adapter: None,
@@ -114,7 +93,7 @@ impl WorkPrecision {
             ..method.clone()
         };
         let mut all = WorkPrecision { method: exactly, precision: Precision::F64, reference: Vec::new() };
-        let finest = Stepping::Adaptive { tolerance: FINEST, most_order: MOST_ORDER };
+        let finest = Stepping { tau: None, tolerance: Some(FINEST), most_order: MOST_ORDER };
         let (exact, _) = all.run(Solver::Direct, &[finest], 1)?.remove(0);
         let reference: Vec<Option<f64>> = exact.iter().map(|ended| ended.outcome.t_relax).collect();
         if reference.iter().any(Option::is_none) {
@@ -139,9 +118,9 @@ impl WorkPrecision {
     /// The ways of stepping, each at several resolutions, the coarsest first: steps of one length, then adaptive steps
     /// of rising order.
     pub fn ways(&self, solver: Solver) -> Vec<Vec<Stepping>> {
-        let fixed = STEPS.map(Stepping::Fixed).to_vec();
+        let fixed = STEPS.map(|tau| Stepping { tau: Some(tau), tolerance: None, most_order: 1 }).to_vec();
         let orders = LEAST_ORDER..=MOST_ORDER;
-        let step = |tolerance: &f64, most_order| Stepping::Adaptive { tolerance: *tolerance, most_order };
+        let step = |tolerance: &f64, most_order| Stepping { tau: None, tolerance: Some(*tolerance), most_order };
         let adaptive =
             |most_order| Effort::of(solver).tolerances.iter().map(|tolerance| step(tolerance, most_order)).collect();
         std::iter::once(fixed).chain(orders.map(adaptive)).collect()
@@ -185,7 +164,7 @@ impl WorkPrecision {
                 members.clear();
                 let cell = Cell::only(spec.clone().validate()?, family.clone());
                 let started = Instant::now();
-                simulate(&[cell], choice.precision(), backend.as_mut(), 0, members)?;
+                simulate(&[cell], choice.precision, backend.as_mut(), 0, members)?;
                 seconds.push(started.elapsed().as_secs_f64());
             }
         }
@@ -200,15 +179,14 @@ impl WorkPrecision {
             omega: Some(OrAuto::Auto),
             pull: OrAuto::Auto,
             t_end: Some(FinalTime::Auto),
-            tau: None,
-            adaptive: None,
             ..self.method.clone()
         };
-        match stepping {
-            Stepping::Fixed(tau) => Spec { tau: Some(tau.into()), ..spec },
-            Stepping::Adaptive { tolerance, most_order } => {
-                Spec { adaptive: Some(tolerance), most_order: Some(most_order), ..spec }
-            }
+        let Stepping { tau, tolerance, most_order } = stepping;
+        Spec {
+            tau: tau.map(Into::into),
+            adaptive: tolerance,
+            most_order: tolerance.map_or(spec.most_order, |_| Some(most_order)),
+            ..spec
         }
     }
 }

@@ -16,15 +16,15 @@ use curvelax_draw::{
     medium::Medium,
     style::SERIES,
 };
-use curvelax_ensemble::{Event, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
+use curvelax_ensemble::{Event, Outcome, Spec, Status, outcome::linear_rate, request::sweep::SweepAxis};
 use curvelax_files::names;
 use curvelax_flow::{crystal::Energy, equilibrium::Equilibrium, flow::Flow};
-use curvelax_statistics::{HALF_INTERVAL, Interval, KaplanMeier, Sample};
+use curvelax_statistics::{HALF_INTERVAL, Interval, Sample};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics, EventStatistics, GroupStatistics},
     explained::{Explained, ExplainedRow, FeaturedMember, TOGETHER},
     scaling::Scaling,
-    tally::{CellTally, DISTRUSTED_DRIFT, MemberTime},
+    tally::{CellTally, DISTRUSTED_DRIFT, shown_time},
     times::TimeStatistics,
 };
 
@@ -95,10 +95,10 @@ impl FinishedRun<'_> {
     /// The times of each cell as a box, and their quantiles against those of two laws.
     fn distribution(&self, medium: Medium, key: &CellKey) -> PageFigure {
         let cells = self.statistics.cells.iter().map(|cell| {
-            let survival = KaplanMeier::new(&self.statistics.times(cell).sample);
-            let known = self.statistics.times(cell).sample.len().min(MAX_QUANTILES);
+            let sample = &self.statistics.times(cell).sample;
+            let known = sample.len().min(MAX_QUANTILES);
             let shares = || (0..known).map(|i| (i as f64 + 0.5) / known as f64);
-            let quantiles = survival.quantiles(shares());
+            let quantiles = sample.quantiles(shares());
             CellQuantiles {
                 places: self.statistics.times(cell).quantiles,
                 quantiles: shares().map(normal_quantile).zip(quantiles).collect(),
@@ -389,10 +389,11 @@ impl FinishedRun<'_> {
 
     /// The times of members that are known by name.
     fn members(&self, medium: Medium) -> PageFigure {
-        let dot = |member: &MemberTime| {
-            let (t, error) = member.shown().or(member.later_than.map(|t| (t, None)))?;
+        let dot = |member: &Outcome| {
+            let time = shown_time(member);
+            let (t, error) = time.or(self.tally.later_than(member).map(|t| (t, None)))?;
             let name = member_name(self.spec(), member);
-            Some(MemberDot { name, t, error, happened: member.shown().is_some() })
+            Some(MemberDot { name, t, error, happened: time.is_some() })
         };
         let members: Vec<MemberDot> = self.tally.named.iter().filter_map(dot).collect();
         let has = |of: &dyn Fn(&MemberDot) -> bool| members.iter().any(of);
@@ -458,7 +459,7 @@ fn first_time(member: &FeaturedMember) -> Option<f64> {
 /// The survival curve of some times, with its band.
 fn survival_curve(sample: &Sample) -> SurvivalCurve {
     let mut curve = SurvivalCurve::default();
-    for step in KaplanMeier::new(sample).steps() {
+    for step in sample.steps() {
         curve.add_step(step.time, step.survival, step.band());
     }
     happened(sample, false).for_each(|t| curve.add_censored(t));

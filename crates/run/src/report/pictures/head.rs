@@ -10,14 +10,13 @@ use curvelax_base::{
     text::{count, p_value, significant},
 };
 use curvelax_draw::medium::Medium;
-use curvelax_ensemble::{Spec, request::sweep::SweepAxis};
-use curvelax_statistics::Interval;
+use curvelax_ensemble::{Outcome, Spec, request::sweep::SweepAxis};
+use curvelax_statistics::{Interval, PairedDifferences};
 use curvelax_study::results::{
     cells::{CellStatistics, EnsembleStatistics},
     comparison::{CellComparison, CellDifference},
     discretisation::DiscretisationError,
     scaling::Scaling,
-    tally::MemberTime,
 };
 
 /// Maximum characters of names in a title.
@@ -156,8 +155,8 @@ impl FinishedRun<'_> {
     }
 
     /// A member that is known by name.
-    fn of_member(&self, member: &MemberTime) -> Headline {
-        let value = format!("{}{}", member_time(member), time_unit(self.spec()));
+    fn of_member(&self, member: &Outcome) -> Headline {
+        let value = format!("{}{}", member_time(self.tally, member), time_unit(self.spec()));
         let time = if member.t_limit.is_some() { "t_limit" } else { "t_relax" };
         let data = member.t_data_error.map(|error| format!("t_data_error {}", significant(error, 2)));
         let note = [member.status.name().into()].into_iter().chain(data).collect::<Vec<_>>().join(", ");
@@ -264,9 +263,9 @@ fn compared(comparison: &CellComparison) -> Option<Headline> {
 /// How many cells differ from the first with a probability of 5 % that any of them does by chance (Bonferroni).
 fn differing(cells: &[CellDifference]) -> String {
     let most = 0.05 / cells.len() as f64;
-    let differ = cells.iter().filter(|cell| cell.test.is_some_and(|test| test.p_value < most)).count();
+    let differ = cells.iter().filter(|cell| cell.found.test.is_some_and(|test| test.p_value < most)).count();
     match cells {
-        [CellDifference { test: Some(test), .. }] => p_value(test.p_value),
+        [CellDifference { found: PairedDifferences { test: Some(test), .. }, .. }] => p_value(test.p_value),
         [_] => "not tested".into(),
         _ => format!("{differ} of {} differ", cells.len()),
     }

@@ -6,13 +6,13 @@ use crate::report::{
     words::{member_name, time_unit, unit_in_title},
 };
 use curvelax_base::text::{p_value, significant};
-use curvelax_ensemble::{Event, Status};
+use curvelax_ensemble::{Event, Outcome, Status};
 use curvelax_files::names;
+use curvelax_statistics::PairedDifferences;
 use curvelax_study::results::{
     cells::{CellStatistics, EventStatistics},
     comparison::CellDifference,
     explained::{ExplainedRow, MAX_CENSORED, MIN_MEMBERS, TOGETHER},
-    tally::MemberTime,
     times::{QUANTILES, TimeStatistics},
 };
 
@@ -41,10 +41,10 @@ impl FinishedRun<'_> {
         let events = event.iter().map(|event| event.name.clone());
         let header = header.chain(events).enumerate().map(|(i, name)| if i > 2 { name + &unit } else { name });
         let [shown, half] = [MEMBER_DIGITS, 2].map(known);
-        let row = |member: &MemberTime| {
-            let MemberTime { t_limit, t_error, t_relax, t_vanish, vanishing, events, .. } = member;
+        let row = |member: &Outcome| {
+            let Outcome { t_limit, t_error, t_relax, t_vanish, t_vanish_limit, t_vanish_error, events, .. } = member;
             let times = [shown(*t_limit), half(*t_error), shown(*t_relax)].into_iter();
-            let gone = [shown(vanishing.map(|(t, _)| t)), half(vanishing.map(|(_, error)| error)), shown(*t_vanish)];
+            let gone = [shown(*t_vanish_limit), half(*t_vanish_error), shown(*t_vanish)];
             let times = times.chain(gone).chain(events.iter().copied().map(&shown));
             let start = [member.member.to_string(), member_name(self.spec(), member), member.status.name().into()];
             start.into_iter().chain(times).collect()
@@ -132,13 +132,14 @@ impl FinishedRun<'_> {
     fn pairs(&self) -> Option<PageTable> {
         let cells = self.statistics.comparison.paired_cells()?;
         let row = |of: &CellDifference| {
-            let [low, high] = of.interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
+            let PairedDifferences { pairs, equal, median, interval, test } = of.found;
+            let [low, high] = interval.map_or([None, None], |(low, high)| [Some(low), Some(high)]);
             let name = self.spec().sweep.name(of.cell);
-            let p = of.test.map_or(String::new(), |test| p_value(test.p_value));
-            let counts = [of.pairs, of.equal].map(|count| count.to_string());
+            let p = test.map_or(String::new(), |test| p_value(test.p_value));
+            let counts = [pairs, equal].map(|count| count.to_string());
             let left_out = [of.left_out.later, of.left_out.earlier, of.left_out.unknown].map(|count| count.to_string());
             let start = [of.cell.to_string(), name].into_iter().chain(counts);
-            start.chain([of.median, low, high].map(known(DIGITS))).chain([p]).chain(left_out).collect()
+            start.chain([median, low, high].map(known(DIGITS))).chain([p]).chain(left_out).collect()
         };
         let header = ["cell", "values", "pairs", "equal", "median", "95 % from", "to", "signed ranks"];
         let left_out = ["left out: later", "earlier", "unknown"];

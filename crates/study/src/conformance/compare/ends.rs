@@ -2,7 +2,7 @@
 
 use super::{
     device::{Left, on_gpu},
-    row::{ConformanceRow, OnCpu, OnGpu},
+    row::{ConformanceRow, Sides},
     scales::Scales,
     setup::method,
     twin::{twin, without_ties},
@@ -87,6 +87,7 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
     let mut rows: Vec<ConformanceRow> = quantities.iter().chain(&DECAY).chain(inside).map(begin).collect();
     for (member, (launch, left)) in launches.iter().zip(ours).enumerate() {
         let twin = twin::<T>(launch, method, n)?;
+        let sides = Sides { member, on_gpu: left, on_cpu: &twin.left };
         same_events(left, &twin.left, adaptive).map_err(|differ| {
             let place = format!("{} n = {n}, member {member}", T::NAME);
             Error::Failed(format!("{place}: {differ}"))
@@ -98,19 +99,19 @@ pub(in crate::conformance) fn compare_ends<T: Evolves>(
         let limit = |bound: &Bound, scale: f64| bound.factor(hardware) * T::EPSILON * scale * roundings;
         let (of_curve, rest) = rows.split_at_mut(quantities.len());
         let (of_decay, inside) = rest.split_at_mut(DECAY.len());
-        curves_agree(of_curve, member, &quantities, &scales, limit, OnGpu(left), OnCpu(&twin.left));
+        curves_agree(of_curve, &quantities, &scales, limit, &sides);
         // The effect of a changed step length inside the run; none with fixed steps.
         let estimate = T::EPSILON * roundings * scales.stiffness() / launch.parameters.adaptive;
         let change = if adaptive { estimate * twin.steepest } else { 0.0 };
         let factors = DECAY.map(|bound| bound.factor(hardware));
         let rounding = T::EPSILON * roundings + change;
-        decays_agree(of_decay, member, launch, factors, rounding, OnGpu(&left.report), OnCpu(&twin.left.report));
+        decays_agree(of_decay, launch, factors, rounding, &sides);
         if adaptive {
             let roundings = [T::EPSILON * roundings, estimate];
             let mut factors = PACE.map(|bound| bound.factor(hardware));
             factors[3] *= twin.leveraged / twin.longest;
             factors[4] *= twin.leverage;
-            insides_agree(inside, member, &scales, factors, roundings, OnGpu(left), OnCpu(&twin.left));
+            insides_agree(inside, &scales, factors, roundings, &sides);
         }
     }
     Ok(rows)
@@ -148,97 +149,75 @@ fn same_events(ours: &Left, theirs: &Left, adaptive: bool) -> Result<(), String>
 /// Compares the last curve and its report, see [`FIELDS`] and [`REPORT`]; `limit` is the bound at a scale.
 fn curves_agree(
     rows: &mut [ConformanceRow],
-    member: usize,
     quantities: &[Bound],
     scales: &Scales,
     limit: impl Fn(&Bound, f64) -> f64,
-    OnGpu(ours): OnGpu<&Left>,
-    OnCpu(theirs): OnCpu<&Left>,
+    sides: &Sides,
 ) {
-    let (our_report, their_report) = (reported(&ours.report), reported(&theirs.report));
-    let ours = ours.state.curve.fields().into_iter().map(|field| field.nodes()).chain(our_report.chunks(1));
-    let theirs = theirs.state.curve.fields().into_iter().map(|field| field.nodes()).chain(their_report.chunks(1));
-    for ((row, bound), (ours, theirs)) in rows.iter_mut().zip(quantities).zip(ours.zip(theirs)) {
+    for (i, (row, bound)) in rows.iter_mut().zip(quantities).enumerate() {
         let scale = scales.get(bound.scale);
-        row.add(member, scale, limit(bound, scale), OnGpu(ours), OnCpu(theirs));
+        sides.compare(row, scale, limit(bound, scale), |left| match left.state.curve.fields().get(i) {
+            Some(field) => field.nodes().to_vec(),
+            None => vec![reported(&left.report)[i - FIELDS.len()]],
+        });
     }
 }
 
-fn middle_of(left: &Left) -> Curve<f64> {
-    dense::inside(&left.state, &left.report.progress, 0.5)
-}
-
 /// Compares the recorded decay of a member, see [`DECAY`]; `rounding` is that of an excess.
-fn decays_agree(
-    rows: &mut [ConformanceRow],
-    member: usize,
-    launch: &Run<f64>,
-    factors: [f64; 2],
-    rounding: f64,
-    ours: OnGpu<&Report<f64>>,
-    theirs: OnCpu<&Report<f64>>,
-) {
-    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
+fn decays_agree(rows: &mut [ConformanceRow], launch: &Run<f64>, factors: [f64; 2], rounding: f64, sides: &Sides) {
     let [way, rate] = rows else { panic!("{} rows of DECAY", rows.len()) };
-    way.add(member, 1.0, factors[0] * rounding, OnGpu(&ours.excess_at), OnCpu(&theirs.excess_at));
+    sides.compare(way, 1.0, factors[0] * rounding, |left| left.report.excess_at.to_vec());
     let slope = |decay: &Decay<f64>| if decay.xx > 0.0 { decay.xy / decay.xx } else { 0.0 };
+    let theirs = &sides.on_cpu.report;
     let (least, span) = (theirs.now.excess.max(launch.parameters.fit_to), theirs.decay.x);
     let scale = if span > 0.0 { 1.0 / (least * span) } else { 0.0 };
-    rate.add(
-        member,
-        scale,
-        factors[1] * rounding * scale,
-        OnGpu(&[slope(&ours.decay)]),
-        OnCpu(&[slope(&theirs.decay)]),
-    );
+    sides.compare(rate, scale, factors[1] * rounding * scale, |left| vec![slope(&left.report.decay)]);
 }
 
 /// Compares what a member's run leaves in addition to its end, see [`PACE`]. `rounding` is the effect of rounding
 /// relative to a scale, `estimate` its relative effect on a step length.
 fn insides_agree(
     rows: &mut [ConformanceRow],
-    member: usize,
     scales: &Scales,
     factors: [f64; 6],
     [rounding, estimate]: [f64; 2],
-    ours: OnGpu<&Left>,
-    theirs: OnCpu<&Left>,
+    sides: &Sides,
 ) {
-    let (OnGpu(ours), OnCpu(theirs)) = (ours, theirs);
     let [start, middle, reports, last, next, events] = rows else { panic!("{} rows of PACE", rows.len()) };
-    let (a, b) = (&ours.report, &theirs.report);
+    let Left { state, counters, report } = sides.on_cpu;
     // The bound of a quantity that changes by `change` in a step.
     let inside = |scale: f64, change: f64| rounding * scale + estimate * change;
     let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    let bounds = FIELDS.map(|bound| scales.get(bound.scale));
-    let starts = [&ours.state.before, &theirs.state.before].map(Curve::clone);
-    let middles = [ours, theirs].map(middle_of);
-    for (row, factor, [a, b]) in [(start, factors[0], starts), (middle, factors[1], middles)] {
-        let fields = a.fields().into_iter().zip(b.fields()).zip(theirs.state.curve.fields()).zip(bounds);
-        for (((a, b), end), scale) in fields {
-            let bound = factor * inside(scale, largest(end.nodes(), b.nodes()));
-            row.add(member, scale, bound, OnGpu(a.nodes()), OnCpu(b.nodes()));
+    let start_of: fn(&Left) -> Curve<f64> = |left| left.state.before.clone();
+    let middle_of: fn(&Left) -> Curve<f64> = |left| dense::inside(&left.state, &left.report.progress, 0.5);
+    for (row, factor, curve_of) in [(start, factors[0], start_of), (middle, factors[1], middle_of)] {
+        let own = curve_of(sides.on_cpu);
+        for (i, bound) in FIELDS.iter().enumerate() {
+            let (nodes, scale) = (|curve: &Curve<f64>| curve.fields()[i].nodes().to_vec(), scales.get(bound.scale));
+            let bound = factor * inside(scale, largest(&nodes(&state.curve), &nodes(&own)));
+            sides.compare(row, scale, bound, |left| nodes(&curve_of(left)));
         }
     }
-    let (before, end) = ([a, b].map(|report| report.before.to_numbers()), theirs.report.now.to_numbers());
+    let (before, end) = (report.before.to_numbers(), report.now.to_numbers());
     for (j, bound) in REPORT.iter().take(end.len()).enumerate() {
-        let ([a, b], scale) = (&before, scales.get(bound.scale));
-        let bound = factors[2] * inside(scale, (b[j] - end[j]).abs());
-        reports.add(member, scale, bound, OnGpu(&a[j..=j]), OnCpu(&b[j..=j]));
+        let scale = scales.get(bound.scale);
+        let bound = factors[2] * inside(scale, (before[j] - end[j]).abs());
+        sides.compare(reports, scale, bound, |left| vec![left.report.before.to_numbers()[j]]);
     }
-    let (a, b) = (&a.progress, &b.progress);
+    let own = &report.progress;
     // The last step reaches the final time, so its length has the total error of those before it.
     let longest = scales.parameters.tau;
-    last.add(member, longest, factors[3] * estimate * longest, OnGpu(&[a.taken]), OnCpu(&[b.taken]));
-    next.add(member, b.next, factors[4] * estimate * b.next, OnGpu(&[a.next]), OnCpu(&[b.next]));
-    let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
-    let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
-    if theirs.counters.half_step != NEVER && theirs.counters.relax_step != NEVER {
+    sides.compare(last, longest, factors[3] * estimate * longest, |left| vec![left.report.progress.taken]);
+    sides.compare(next, own.next, factors[4] * estimate * own.next, |left| vec![left.report.progress.next]);
+    if counters.half_step != NEVER && counters.relax_step != NEVER {
+        let half = |p: &Progress<f64>| p.half_high + (p.half_low + p.half_fraction * p.half_length);
+        let relaxed = |p: &Progress<f64>| p.relax_high + (p.relax_low + p.relax_fraction * p.relax_length);
         // The rounding of an excess over its rate of decay, and the effect of the place inside its step.
         let p = &scales.parameters;
-        let rate = (p.half_at - p.relax_at) / (relaxed(b) - half(b));
-        let bound = factors[5] * (rounding / rate + estimate * b.half_length.max(b.relax_length));
-        events.add(member, b.relax_length, bound, OnGpu(&[half(a), relaxed(a)]), OnCpu(&[half(b), relaxed(b)]));
+        let rate = (p.half_at - p.relax_at) / (relaxed(own) - half(own));
+        let bound = factors[5] * (rounding / rate + estimate * own.half_length.max(own.relax_length));
+        let both = |left: &Left| vec![half(&left.report.progress), relaxed(&left.report.progress)];
+        sides.compare(events, own.relax_length, bound, both);
     }
 }
 

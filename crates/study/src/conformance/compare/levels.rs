@@ -3,7 +3,7 @@
 use super::{
     device::{Left, on_gpu},
     ends::{launches, roundings},
-    row::{ConformanceRow, OnCpu, OnGpu},
+    row::{ConformanceRow, Sides},
     scales::Scales,
     setup::method,
     twin::{Twin, twin},
@@ -97,13 +97,15 @@ fn agree<T: Evolves>(
         at.parameters.tau = at.parameters.tau.max(longest);
         let scales = Scales::of(&at)?;
         let roundings = T::EPSILON * roundings::<T>(theirs.counters.steps, order, adaptive);
-        let (a, b) = (Crossing::of(launch, ours, place, level), Crossing::of(launch, &theirs, place, level));
+        let crossing = |left: &Left| Crossing::of(launch, left, place, level);
+        let Crossing { step, slope, .. } = crossing(&theirs);
         let bound: &Bound = &REPORT[place];
         let rounding = bound.factor(hardware) * roundings * scales.get(bound.scale);
         let estimate = if adaptive { roundings * scales.stiffness() / launch.parameters.adaptive } else { 0.0 };
-        let bound = EVENT.factor(hardware) * (rounding / b.slope + estimate * b.step);
+        let bound = EVENT.factor(hardware) * (rounding / slope + estimate * step);
         if bound.is_finite() {
-            row.add(member, b.step, bound, OnGpu(&[a.t]), OnCpu(&[b.t]));
+            let sides = Sides { member, on_gpu: ours, on_cpu: &theirs };
+            sides.compare(&mut row, step, bound, |left| vec![crossing(left).t]);
         }
     }
     Ok(row)

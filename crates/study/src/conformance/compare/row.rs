@@ -2,14 +2,25 @@
 
 use serde::Serialize;
 
+use super::device::Left;
 use crate::conformance::bounds::Bound;
 use curvelax_flow::scheme::evolve::Evolves;
 use curvelax_flow::solver::Solver;
 
-/// A result of the kernel.
-pub(super) struct OnGpu<V>(pub(super) V);
-/// A result of its twin. A separate type, so that one side cannot be passed twice.
-pub(super) struct OnCpu<V>(pub(super) V);
+/// What the kernel and its twin leave of a member. What is compared is taken from both by one function, so that one
+/// side cannot be passed twice.
+pub(super) struct Sides<'a> {
+    pub(super) member: usize,
+    pub(super) on_gpu: &'a Left,
+    pub(super) on_cpu: &'a Left,
+}
+
+impl Sides<'_> {
+    /// Adds to a line what `of` takes from both.
+    pub(super) fn compare(&self, row: &mut ConformanceRow, scale: f64, bound: f64, of: impl Fn(&Left) -> Vec<f64>) {
+        row.add(self.member, scale, bound, &of(self.on_gpu), &of(self.on_cpu));
+    }
+}
 
 /// One line of the table: the worst case of a quantity over all members and nodes.
 #[derive(Clone, Debug, Serialize)]
@@ -68,14 +79,7 @@ impl ConformanceRow {
     }
 
     /// Adds a member; the larger fraction of the bound wins, and NaN always wins.
-    pub(super) fn add(
-        &mut self,
-        member: usize,
-        scale: f64,
-        bound: f64,
-        OnGpu(ours): OnGpu<&[f64]>,
-        OnCpu(theirs): OnCpu<&[f64]>,
-    ) {
+    pub(super) fn add(&mut self, member: usize, scale: f64, bound: f64, ours: &[f64], theirs: &[f64]) {
         assert!(!ours.is_empty() && ours.len() == theirs.len(), "{}: sides of different length", self.quantity);
         for (node, (a, b)) in ours.iter().zip(theirs).enumerate() {
             let error = (a - b).abs();

@@ -2,7 +2,7 @@
 
 use super::{
     device::to_their_goals,
-    row::{ConformanceRow, OnCpu, OnGpu},
+    row::ConformanceRow,
     scales::Scales,
     setup::{MAX_SWEEPS, blocks, method, traced_workspace},
 };
@@ -55,7 +55,7 @@ pub fn stages<T: Evolves>(
             let at = (member * TRACE_FIELDS + field) * n;
             let scale = scales.get(bound.scale);
             let limit = bound.factor(adapter.is_hardware()) * T::EPSILON * scale;
-            row.add(member, scale, limit, OnGpu(&trace[at..at + n]), OnCpu(&twin[field]));
+            row.add(member, scale, limit, &trace[at..at + n], &twin[field]);
         }
     }
     Ok(rows)

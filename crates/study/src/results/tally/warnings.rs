@@ -196,7 +196,7 @@ mod tests {
         let later_than =
             |of: &Tally, cell: usize| of.cells[cell].relaxing.times.iter().map(|seen| seen.time).collect::<Vec<_>>();
         assert_eq!(later_than(&vesicles, 0), [0.0, 0.5, 0.0]);
-        assert_eq!(vesicles.named[0].later_than, None);
+        assert_eq!(vesicles.later_than(&vesicles.named[0]), None);
         let warning = "2 of 3 members still moved at their final time, or came back near the threshold of the energy: \
                        their t_relax is unknown, and the statistics are those of the others, mostly the fast ones; use a longer --t-end, or another --relax-to";
         assert_eq!(vesicles.warnings(), [warning]);
@@ -205,7 +205,7 @@ mod tests {
         let others = own().map(|of| Outcome { cell: 1, ..of });
         let both = of(sweep, &[&own()[..], &others].concat());
         assert_eq!((later_than(&both, 0), later_than(&both, 1)), (vec![2.0, 0.5, 2.0], vec![0.0, 0.5, 0.0]));
-        assert_eq!((both.named[0].later_than, both.named[3].later_than), (Some(2.0), None));
+        assert_eq!([0, 3].map(|i| both.later_than(&both.named[i])), [Some(2.0), None]);
         let [first, ..] = own();
         let unfinished = [0, 1].map(|cell| Outcome { member: cell, cell, ..first.clone() });
         let late = [
