@@ -88,12 +88,14 @@ class Keys(TypedDict, total=False):
 
     energy: str
     """Surface energy γ of a crystal (anisotropic) under surface diffusion, by the angle ψ of the outward normal:
-    cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG); a sum of two is cos:...+cos:... . M is 2 to 12, and EPS (M^2 - 1) below
-    1. Any number may be a distribution. energy 1 is isotropic, but in the geometric form. By default 1."""
+    cos:FOLD,EPS[,DEG] is 1 + EPS cos FOLD(ψ - DEG); a sum of two is cos:...+cos:... . FOLD is 2 to 12, and EPS
+    (FOLD^2 - 1) below 1. Any number may be a distribution. energy 1 is isotropic, but in the geometric form. By
+    default 1."""
 
     diffusivity: str
-    """Mobility of the atoms along the surface of a crystal: cos:M,EPS[,DEG] is 1 + EPS cos M(ψ - DEG), above 0 in all
-    directions; a sum of two as for energy. Any number may be a distribution. By default 1."""
+    """Relative diffusivity along the surface of a crystal, by the same angle: cos:FOLD,EPS[,DEG] is 1 + EPS cos
+    FOLD(ψ - DEG), above 0 in all directions; a sum of two as for energy. Any number may be a distribution. By default
+    1."""
 
     drive: float | str | Any
     """Driving force along the normal, positive inwards, as a velocity in length/time: a circle under surface
@@ -125,8 +127,8 @@ class Keys(TypedDict, total=False):
 
     t_end: float | Literal["auto"] | Sequence[float]
     """Final time. auto: each member ends when it is relaxed, at the latest at six times the relaxation time that
-    linear theory predicts for its cell; a member that drive shrinks to a point ends there. T1,T2,...: one for each
-    cell of a sweep. By default 2."""
+    linear theory predicts for its cell; a member that drive shrinks to a point runs until it vanishes. T1,T2,...: one
+    for each cell of a sweep. By default 2."""
 
     omega: float | Literal["auto"]
     """Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member. By default 1
@@ -144,8 +146,8 @@ class Keys(TypedDict, total=False):
     outlines, whose initial excess is that of their details. By default off."""
 
     stop_when_relaxed: bool
-    """End a member as soon as it is relaxed; one that drive shrinks to a point ends there. Vesicles (conserve
-    area,length) run to the final time. By default false; with t-end auto true."""
+    """End a member as soon as it is relaxed; one that drive shrinks to a point runs until it vanishes, and vesicles
+    (conserve area,length) run to the final time. By default false; with t-end auto true."""
 
     accurate: bool
     """What we recommend for numbers to publish: adaptive pull auto omega auto t-end auto stop-when-relaxed refine;

@@ -195,7 +195,7 @@ fn python_type(value: &str, words: Option<&str>) -> String {
         "SHAPE" => "Any",
         "KEY=V1,V2,..." => "Mapping[str, Sequence[Any]]",
         "NAME=CONDITION" => "str | Sequence[str]",
-        "FLOW" | "GAMMA" | "M" | "WHAT" | "LO..=HI" | "PROPERTY" | "NAME" | "LENGTH,TIME" | "I/N" => "str",
+        "FLOW" | "GAMMA" | "D" | "WHAT" | "LO..=HI" | "PROPERTY" | "NAME" | "LENGTH,TIME" | "I/N" => "str",
         other => panic!("a key has a value {other}, of which the type in Python is not known: name it here"),
     };
     own.to_owned()

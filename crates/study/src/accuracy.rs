@@ -95,9 +95,9 @@ impl fmt::Display for Round {
         match of {
             Uncertain::Each => write!(f, "the relative error of each time is {all}"),
             Uncertain::Median => {
-                write!(f, "the relative uncertainty of the median is {all}, {discretisation} of it by discretisation")
+                write!(f, "the relative uncertainty of the median is {all} (that of discretisation {discretisation})")
             }
-            Uncertain::Sampled => write!(f, "the relative uncertainty of the median is {all}, by sampling alone"),
+            Uncertain::Sampled => write!(f, "the relative uncertainty of the median is {all} (sampling alone)"),
         }
     }
 }

@@ -227,8 +227,8 @@ keys! {
         /// before SPEC.toml [default: off]
         adaptive?: f64, "TOL", EVOLUTION, or "0.001";
         /// Final time. auto: each member ends when it is relaxed, at the latest at six times the relaxation time that
-        /// linear theory predicts for its cell; a member that --drive shrinks to a point runs until it vanishes. T1,T2,...: one for
-        /// each cell of a sweep [default: 2]
+        /// linear theory predicts for its cell; a member that --drive shrinks to a point runs until it vanishes.
+        /// T1,T2,...: one for each cell of a sweep [default: 2]
         t_end?: FinalTime, "T", EVOLUTION;
         /// Rate ω, in 1/time, of the redistribution towards equal spacing. auto is 4/R^4 for each member
         /// [default: 1 with --tau, auto with --adaptive and --tau auto]

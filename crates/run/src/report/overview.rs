@@ -10,7 +10,7 @@ use curvelax_base::{
     error::shortened,
     text::{count, duration, number, plural, rounded, rounded_beside},
 };
-use curvelax_ensemble::Spec;
+use curvelax_ensemble::{Spec, Status};
 use curvelax_files::names::{ENSEMBLE, GROUPS};
 use curvelax_study::{
     placement::Platform,
@@ -52,7 +52,7 @@ impl fmt::Display for Overview<'_> {
             _ => None,
         };
         let of_only = |text: &dyn Fn(&CellStatistics) -> String| only.map_or(String::new(), text);
-        let [sampling, discretisation] = only.map_or_else(Default::default, |cell| errors(cell, self.spec));
+        let [sampling, discretisation] = only.map_or_else(|| self.of_listed(), |cell| errors(cell, self.spec));
         self.statuses(f)?;
         writeln!(f)?;
         match self.spec.names_members() {
@@ -98,7 +98,12 @@ impl Overview<'_> {
         for (rank, (status, count)) in self.tally.counts().enumerate() {
             if count > 0 || rank < 2 {
                 let share = 100.0 * count as f64 / members.max(1) as f64;
-                writeln!(f, "{:<11}{count:>10}{share:>8.1} %", status.name())?;
+                let before = self.tally.relaxed_before_vanishing();
+                let before = match status {
+                    Status::Vanished if before > 0 => format!("  {before} after relaxing"),
+                    _ => String::new(),
+                };
+                writeln!(f, "{:<11}{count:>10}{share:>8.1} %{before}", status.name())?;
             }
         }
         writeln!(f, "{:<11}{members:>10}", "all")
@@ -118,6 +123,17 @@ impl Overview<'_> {
     /// The times of a cell of which limits are shown, if they are.
     fn limits_of<'b>(&self, cell: &'b CellStatistics) -> Option<&'b TimeStatistics> {
         Some(&cell.relaxing.times).filter(|_| self.statistics.of_limits)
+    }
+
+    /// What discretisation does to times of listed members that have no limits, in the cell where it does most.
+    fn of_listed(&self) -> [String; 2] {
+        let size = |cell: &&CellStatistics| cell.relaxing.discretisation.as_ref().map_or(0.0, |of| of.mean.abs());
+        let cells = self.statistics.cells.iter().filter(|_| self.spec.names_members() && !self.statistics.of_limits);
+        let Some(worst) = cells.max_by(|a, b| size(a).total_cmp(&size(b))) else { return Default::default() };
+        let [_, text] = errors(worst, self.spec);
+        let several = self.statistics.cells.len() > 1 && !text.is_empty();
+        let name = if several { format!("{}: ", self.spec.sweep.name(worst.cell)) } else { String::new() };
+        [String::new(), name + &text]
     }
 
     /// Each member with its time, where they are few and known by name.
@@ -147,9 +163,10 @@ impl Overview<'_> {
             }
             writeln!(f)?;
         }
-        if by_points {
-            let what = "how much the time changes if every second point of the outline is left out";
-            writeln!(f, "{:<11}± t_error is the error of the method; t_data_error is {what}", "")?;
+        if self.statistics.of_limits {
+            let what = "; t_data_error is how much the time changes if every second point of the outline is left out";
+            let what = if by_points { what } else { "" };
+            writeln!(f, "{:<11}± t_error is the half-width of the 95 % interval of t_limit{what}", "")?;
         }
         self.pairs(f)?;
         writeln!(f)
@@ -254,9 +271,10 @@ impl Overview<'_> {
     }
 }
 
-/// The rates of a cell; empty if no member has one.
-fn rate(CellStatistics { rates: Rates { numbers, .. }, .. }: &CellStatistics) -> String {
-    let Some(median) = numbers.get("median") else { return String::new() };
+/// The rates of a cell; empty if no member has one, or none relaxed.
+fn rate(CellStatistics { rates: Rates { numbers, .. }, relaxing, .. }: &CellStatistics) -> String {
+    let relaxed = relaxing.times.sample.events() > 0;
+    let Some(median) = numbers.get("median").filter(|_| relaxed) else { return String::new() };
     let theory = numbers.get("ratio");
     let theory = theory.map_or(String::new(), |ratio| format!(", {} times that of linear theory", significant(ratio)));
     let fits = count(numbers.known as u64, "fit");
@@ -346,7 +364,7 @@ results    out: summary.csv, run.json
         let some = told(&tally);
         assert!(
             some.ends_with(&format!(
-                "{about}; 1 of them needs more nodes to show how its times converge: use --refine, or more --points"
+                "{about}; the order of convergence of 1 of 4 members is not steady yet: use --refine, or more --points"
             )),
             "{some}"
         );

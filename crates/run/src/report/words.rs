@@ -80,7 +80,8 @@ fn final_time(spec: &Spec, unit: &str) -> String {
     match spec.t_end.clone().unwrap_or(spec.final_time().into()) {
         t_end @ FinalTime::At(_) if spec.stops_when_relaxed() => format!("t-end ≤ {t_end}{unit}"),
         t_end @ FinalTime::At(_) => format!("t-end = {t_end}{unit}"),
-        t_end => format!("t-end = {t_end}"),
+        t_end @ FinalTime::OfCells(_) => format!("t-end from {t_end}{unit}, by cell"),
+        FinalTime::Auto => "t-end = auto".into(),
     }
 }
 
@@ -223,7 +224,9 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
     // If all are equal, there is none.
     let interval = of.interval().filter(|interval| interval.lower != interval.upper);
     let interval = interval.map_or(String::new(), |interval| format!(" ({}{both})", interval.in_words(significant)));
-    let error = mean.standard_error.map_or(String::new(), |error| format!(" (standard error {})", significant(error)));
+    let alone = if raw.is_some() { ", sampling alone" } else { "" };
+    let error = mean.standard_error.map(|error| format!(" (standard error {}{alone})", significant(error)));
+    let error = error.unwrap_or_default();
     let least = if mean.restricted_to.is_some() { "at least " } else { "" };
     let without = raw.map_or(0, |raw| raw.sample.events() as u64).saturating_sub(known);
     let others = [(without, "without a limit"), (members - known - without.min(members - known), "censored")];
@@ -236,6 +239,11 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
     )
 }
 
+/// Fewer members have no interval of 95 % of their median, but a range.
+const MIN_MEMBERS: usize = 6;
+/// The sides of an interval are named each if one is longer than the other by this factor.
+const UNEVEN: f64 = 1.5;
+
 /// What sampling and discretisation do to the times of a cell, a sentence each, and what to do if discretisation does
 /// more.
 pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
@@ -244,13 +252,19 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
         return Default::default();
     }
     let bounds = times.interval().and_then(|interval| interval.bounds());
-    let half = bounds.zip(times.median()).map(|((low, high), median)| 0.5 * (high - low) / median);
+    let sides = bounds.zip(times.median()).map(|((low, high), median)| [1.0 - low / median, high / median - 1.0]);
     // Members that start at rest have none.
-    let half = half.filter(|half| half.is_finite());
-    let sampling = match half {
-        // Their interval is for both, and says so.
-        _ if limits.is_some() => String::new(),
-        Some(half) => format!("the interval of the median, ±{} %, covers sampling alone", rounded(100.0 * half, 2)),
+    let sides = sides.filter(|sides| sides.iter().all(|side| side.is_finite()));
+    let half = sides.map(|[below, above]| 0.5 * (below + above));
+    let sampling = match sides {
+        // Their interval is for both, and says so; the range of a few says what it is.
+        _ if limits.is_some() || (sides.is_some() && times.sample.len() < MIN_MEMBERS) => String::new(),
+        Some([below, above]) => {
+            let [half, low, high] = [0.5 * (below + above), below, above].map(|share| rounded(100.0 * share, 2));
+            let is_even = (UNEVEN.recip()..=UNEVEN).contains(&(above / below));
+            let width = if is_even { format!("±{half} %") } else { format!("-{low} % to +{high} %") };
+            format!("the interval of the median, {width}, covers sampling alone")
+        }
         None if bounds.is_none() && times.sample.len() > 1 => {
             "the interval of the median is open: too few members relaxed".into()
         }
@@ -259,6 +273,9 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
     [sampling, discretisation(cell, spec, half)]
 }
 
+/// What helps where orders of convergence are not steady.
+const REMEDY: &str = "use --refine, or more --points";
+
 /// What discretisation does to the times of a cell, beside `half` the relative interval of their median.
 fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> String {
     let EventStatistics { discretisation, limits, .. } = &cell.relaxing;
@@ -266,22 +283,15 @@ fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> Stri
         if limits.is_some() {
             return String::new();
         }
-        return "the error of discretisation is unknown: no member has times at n, n/√2 and n/2 nodes".into();
+        return "the error of discretisation is unknown: no member relaxed with each of n, n/√2 and n/2 nodes".into();
     };
     let DiscretisationError { members, mean, error, not_asymptotic } = *discretisation;
     let known = plural(members as u64, "member");
-    let remedy = if spec.refine { "t_error bounds the error" } else { "use --refine, or more --points" };
-    let (need, whose) = if not_asymptotic == 1 { ("needs", "its") } else { ("need", "their") };
-    let unclear = format!("{need} more nodes to show how {whose} times converge");
+    let unsteady = format!("the order of convergence of {not_asymptotic} of {members} {known} is not steady yet");
     if !discretisation.converges() {
         return match limits.as_ref().and_then(|limits| limits.error) {
-            Some(bound) => format!(
-                "the median t_error, {}, is conservative: {not_asymptotic} of {members} {known} {unclear}",
-                significant(bound)
-            ),
-            None => format!(
-                "the error of discretisation is unknown: {not_asymptotic} of {members} {known} {unclear}; {remedy}"
-            ),
+            Some(bound) => format!("the median t_error is {}", significant(bound)),
+            None => format!("the error of discretisation is unknown: {unsteady}; {REMEDY}"),
         };
     }
     let [size, error] = [mean.abs(), error].map(|value| rounded(100.0 * value, 2));
@@ -290,8 +300,8 @@ fn discretisation(cell: &CellStatistics, spec: &Spec, half: Option<f64>) -> Stri
     let side = if mean < 0.0 { "short" } else { "long" };
     let larger = half.is_none_or(|half| mean.abs() > half);
     let advice = match () {
-        () if not_asymptotic > 0 => format!("; {not_asymptotic} of them {unclear}: {remedy}"),
-        () if spec.refine => "; t_limit is free of this error".into(),
+        () if spec.refine => "; t_limit is corrected for it, to within t_error".into(),
+        () if not_asymptotic > 0 => format!("; {unsteady}: {REMEDY}"),
         () if larger && matches!(spec.pace(), Pace::Adaptive(_)) => "; --refine removes this error".into(),
         () if larger => "; --accurate removes this error".into(),
         () => String::new(),
@@ -364,7 +374,7 @@ pub(super) fn significant(value: f64) -> String {
     let size = value.abs();
     match size {
         _ if size == 0.0 => "0".into(),
-        _ if !(1e-4..1e15).contains(&size) => format!("{value:.3e}"),
+        _ if !(1e-4..1e7).contains(&size) => format!("{value:.3e}"),
         _ => {
             let digits = (3 - size.log10().floor() as i32).max(0) as usize;
             format!("{value:.digits$}")

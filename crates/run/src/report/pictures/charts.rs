@@ -49,18 +49,26 @@ impl FinishedRun<'_> {
         let key = &self.cell_key(medium == Medium::Page);
         if self.spec().names_members() {
             // A mean over outlines of unlike sizes would mean nothing.
-            let excess = if self.spec().members_per_cell() == 1 { self.excess(medium, key)? } else { None };
+            let is_single = self.spec().members_per_cell() == 1;
+            let excess = if is_single && !self.is_constant() { self.excess(medium, key)? } else { None };
             return Ok([self.members(medium)].into_iter().chain(excess).chain(self.dependence(medium)).collect());
         }
         let mut charts = vec![self.relaxation(medium, key), self.distribution(medium, key), self.survival(medium, key)];
         charts.extend(self.groups(medium));
         charts.extend(self.events(medium));
-        charts.extend(self.excess(medium, key)?);
-        charts.push(self.rates(medium, key));
+        if !self.is_constant() {
+            charts.extend(self.excess(medium, key)?);
+            charts.push(self.rates(medium, key));
+        }
         charts.extend(self.dependence(medium));
         charts.push(self.features(medium, key));
         charts.push(self.mesh(medium));
         Ok(charts)
+    }
+
+    /// Whether the excess of all members is: area and length are kept.
+    fn is_constant(&self) -> bool {
+        (0..self.tally.cells.len() as u64).all(|cell| self.spec().has_vesicles_in(cell))
     }
 
     /// What is said of a chart: what ran, and `rest`.

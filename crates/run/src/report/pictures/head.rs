@@ -204,7 +204,7 @@ impl FinishedRun<'_> {
             (time_unit(self.spec()), cell.relaxing.discretisation.as_ref().map_or(0, |error| error.not_asymptotic));
         let bound = match open {
             0 => "half-width of the 95 % interval of each t_limit".into(),
-            _ => format!("conservative for {}", count(open as u64, "member")),
+            _ => format!("a cautious bound for {}", count(open as u64, "member")),
         };
         let shown = |value: f64, digits: usize| format!("{}{unit}", significant(value, digits));
         let error = cell.relaxing.limits.as_ref().and_then(|limits| limits.error);
@@ -232,7 +232,7 @@ fn discretisation(cell: &CellStatistics) -> Vec<Headline> {
     let known = count(*members as u64, "member");
     let (value, note) = match discretisation.converges() {
         true => (format!("{mean} %"), format!("± {error} % of t_relax, estimated from {known}")),
-        false => ("unknown".into(), format!("most of {known} need more nodes to show how their times converge")),
+        false => ("unknown".into(), format!("the order of convergence is not steady yet for most of {known}")),
     };
     vec![Headline::new("discretisation error", value, note)]
 }
