@@ -332,7 +332,7 @@ all                 4
 ensemble   ellipse:2,1, surface-diffusion, amplitude 0.05, n = 100, tau = 0.001, t-end = 2, seed 1
 t_relax    median 0.5000 (range of all 4, 0.3000 or more, which contains the median with probability 93.8 %), mean at least 1.200 (standard error 0.4016) over 2 members that relaxed; 2 censored
 sampling   the interval of the median is open: too few members relaxed
-resolution the error of discretisation is unknown: no member has times at n, n/√2 and n/2 nodes
+resolution the error of discretisation is unknown: no member relaxed with each of n, n/√2 and n/2 nodes
 work       each member took 10 steps on average, with 20 Gauss-Seidel sweeps for k and 5 for x, y
 ran on     cpu, f64, 2 threads (no hardware GPU)
 wall time  12.3 s

@@ -52,8 +52,8 @@ impl Remedies {
             (true, false, _) => ", --adaptive --pull auto helps, and more --points",
             (true, true, false) => ", --pull auto helps, and more --points",
             (true, true, true) => {
-                ", more --points help, and a --pull of ten times auto: with --energy, --drive or --conserve nodes must resolve the \
-                 curve, and a smaller --adaptive does not help (docs/method.md)"
+                ", more --points help, and a --pull of 960/R^4, ten times auto (R^2 = area/pi): with --energy, --drive or \
+                 --conserve nodes must resolve the curve, and a smaller --adaptive does not help (docs/method.md)"
             }
         };
         // Vesicles and crystals at rest are moved by rounding alone.

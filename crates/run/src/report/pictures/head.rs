@@ -47,14 +47,20 @@ impl FinishedRun<'_> {
             (None, Some(_)) => "in the unit of time of B".into(),
             (None, None) => "in length⁴, in the unit of length of the coordinates".into(),
         };
+        let relaxed = match self.spec().has_vesicles() {
+            true => {
+                " A vesicle is relaxed once |E - E_end| of its bending energy stays below relax-to times its maximum."
+            }
+            false => "",
+        };
         match self.statistics.of_limits {
             true => format!(
                 "t_limit is the limit of t_relax for many nodes and short steps{}; t_relax itself is the time at n = {}. \
-                 Times are {unit}.",
+                 Times are {unit}.{relaxed}",
                 if self.spec().drive.is_some() { ", t_vanish_limit that of t_vanish" } else { "" },
                 self.spec().points
             ),
-            false => format!("Times are {unit}."),
+            false => format!("Times are {unit}.{relaxed}"),
         }
     }
 

@@ -229,13 +229,13 @@ mod tests {
         let spec = "drive = 0.5\nadaptive = 1e-3\nevent = ['early = k_min >= 0']";
         let told = of(&format!("refine = true\n{spec}"), &members).warnings();
         let starts = [
-            "2 of 3 members relaxed and have",
-            "1 of 3 members vanished and",
-            "1 of 3 members reached the event early",
+            "2 of 3 members relaxed without a limit:",
+            "1 of 3 members vanished without a limit:",
+            "1 of 3 members reached the event early without a limit:",
         ];
         assert_eq!(told.len(), starts.len(), "{told:?}");
         assert!(told.iter().zip(starts).all(|(told, start)| told.starts_with(start)), "{told:?}");
-        assert!(told[1].contains("or they were not round at the end") && !told[0].contains("round"), "{told:?}");
+        assert!(told[1].contains("or a curve was not round at the end") && !told[0].contains("round"), "{told:?}");
         assert_eq!(of(spec, &members).warnings(), [""; 0]);
     }
 }
