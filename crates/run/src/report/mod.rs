@@ -117,7 +117,7 @@ impl RunReport {
     /// Resumes the report of an interrupted run; returns the progress of the run.
     ///
     /// # Errors
-    /// [`Error::Request`] if its files are not those of the study.
+    /// [`Error::Request`](curvelax_base::error::Error::Request) if its files are not those of the study.
     pub fn resume(
         folder: OutputFolder,
         study: &Study,
