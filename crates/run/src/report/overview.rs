@@ -95,10 +95,10 @@ impl Overview<'_> {
     fn statuses(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let members = self.tally.members();
         writeln!(f, "{:<11}{:>10}{:>10}", "status", "members", "share")?;
+        let before = self.tally.relaxed_before_vanishing();
         for (rank, (status, count)) in self.tally.counts().enumerate() {
             if count > 0 || rank < 2 {
                 let share = 100.0 * count as f64 / members.max(1) as f64;
-                let before = self.tally.relaxed_before_vanishing();
                 let before = match status {
                     Status::Vanished if before > 0 => format!("  {before} after relaxing"),
                     _ => String::new(),

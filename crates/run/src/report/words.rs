@@ -239,8 +239,6 @@ pub(super) fn times(of: &TimeStatistics, raw: Option<&TimeStatistics>, did: &str
     )
 }
 
-/// Fewer members have no interval of 95 % of their median, but a range.
-const MIN_MEMBERS: usize = 6;
 /// The sides of an interval are named each if one is longer than the other by this factor.
 const UNEVEN: f64 = 1.5;
 
@@ -251,16 +249,18 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
     if times.sample.events() == 0 {
         return Default::default();
     }
-    let bounds = times.interval().and_then(|interval| interval.bounds());
+    let interval = times.interval();
+    let is_range = interval.is_some_and(|interval| interval.range_of.is_some());
+    let bounds = interval.and_then(|interval| interval.bounds());
     let sides = bounds.zip(times.median()).map(|((low, high), median)| [1.0 - low / median, high / median - 1.0]);
     // Members that start at rest have none.
     let sides = sides.filter(|sides| sides.iter().all(|side| side.is_finite()));
-    let half = sides.map(|[below, above]| 0.5 * (below + above));
+    let half = |[below, above]: [f64; 2]| 0.5 * (below + above);
     let sampling = match sides {
         // Their interval is for both, and says so; the range of a few says what it is.
-        _ if limits.is_some() || (sides.is_some() && times.sample.len() < MIN_MEMBERS) => String::new(),
+        _ if limits.is_some() || (sides.is_some() && is_range) => String::new(),
         Some([below, above]) => {
-            let [half, low, high] = [0.5 * (below + above), below, above].map(|share| rounded(100.0 * share, 2));
+            let [half, low, high] = [half([below, above]), below, above].map(|share| rounded(100.0 * share, 2));
             let is_even = (UNEVEN.recip()..=UNEVEN).contains(&(above / below));
             let width = if is_even { format!("±{half} %") } else { format!("-{low} % to +{high} %") };
             format!("the interval of the median, {width}, covers sampling alone")
@@ -270,7 +270,7 @@ pub(super) fn errors(cell: &CellStatistics, spec: &Spec) -> [String; 2] {
         }
         None => String::new(),
     };
-    [sampling, discretisation(cell, spec, half)]
+    [sampling, discretisation(cell, spec, sides.map(half))]
 }
 
 /// What helps where orders of convergence are not steady.
